@@ -9,9 +9,6 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.effects import library
-from identification.gap.laws.knees import FLOWS_BACK
-from identification.gap.model.bench import make_bench
 from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 
@@ -51,20 +48,3 @@ def test_what_is_stiff_then_soft_then_stiff_again_is_no_seat() -> None:
     share = np.abs(data.force) / np.abs(data.force).max()
     snaps = 6e-5 * np.clip((share - 0.27) / 0.18, 0.0, 1.0) * np.sign(data.force)
     assert explained(moved(data, snaps)).verdict != "contact_seating"
-
-
-def test_what_never_yielded_leaves_nothing_to_flow_back() -> None:
-    bench = make_bench(arm_data())
-    some = [
-        v
-        for v in library(bench, ["joint_yield"])
-        if v.label.endswith(FLOWS_BACK) and v.info["memory"] == ""
-    ]
-    assert some
-    for v in some:
-        (limit,), k = v.within, len(v.info["radius"])
-        yields, flows = np.zeros(len(limit)), np.zeros(len(limit))
-        yields[:k], flows[k:] = 1.0, 1.0
-        assert limit @ yields >= 0.0
-        assert limit @ flows < 0.0
-        assert limit @ (yields + 1e-3 * flows) >= 0.0 or not limit @ yields > 1e-2

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.laws.flow_back import BACK, flowing_back, yielded_from
+from identification.gap.laws.flow_back import flowing_back, yielded_from
 from identification.gap.laws.hardened import hardened
 from identification.gap.laws.lasting import HARDENS, LEAST, SCALES
 from identification.gap.laws.specimens import softening
@@ -142,8 +142,6 @@ def with_back(
     for more, name in ([], ""), *([(back, FLOWS_BACK)] if back else []):
         k, n = len(columns), len(columns) + len(more)
         each, within = softening(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
-        if more and not info["softens"]:
-            within = _no_more_than_yielded(info, k, n)
         out.append(
             variant(
                 word,
@@ -161,18 +159,6 @@ def with_back(
             )
         )
     return out
-
-
-def _no_more_than_yielded(info: dict[str, Any], k: int, n: int) -> Array:
-    """(1, n) a sum that is not negative where, from the largest load to none, no more flows back
-    than had yielded there: what never yielded leaves nothing to flow back."""
-    load = np.asarray(info["load"]) + info.get("weight", 0.0)
-    most = float(np.abs(load).max())
-    row = np.zeros((1, n))
-    row[0, :k] = np.maximum(most - np.asarray(info["radius"]), 0.0) / most
-    back = np.maximum(1 - 2 * np.array(BACK) * float(info["top"]) / most, 0.0)
-    row[0, k : k + len(back)] = -back[: n - k]
-    return np.round(row, 9)  # the same for shapes that differ in their lever alone
 
 
 FLOWS_BACK = ", flows back"
