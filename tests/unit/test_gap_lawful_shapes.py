@@ -9,6 +9,8 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
+from identification.gap.effects import library
+from identification.gap.model.bench import make_bench
 from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 
@@ -48,3 +50,22 @@ def test_what_is_stiff_then_soft_then_stiff_again_is_no_seat() -> None:
     share = np.abs(data.force) / np.abs(data.force).max()
     snaps = 6e-5 * np.clip((share - 0.27) / 0.18, 0.0, 1.0) * np.sign(data.force)
     assert explained(moved(data, snaps)).verdict != "contact_seating"
+
+
+@pytest.mark.parametrize("name", ["quadratic", "cubic"])
+def test_a_curve_that_goes_back_under_more_load_is_none(name: str) -> None:
+    """The least of it leaves no compliance at the largest load, and some at any other."""
+    bench = make_bench(arm_data())
+    some = [v for v in library(bench, ["joint_nonlinear_stiffness"]) if v.label.endswith(name)]
+    assert some
+    for v in some:
+        assert v.positive is not None
+        assert v.joint is not None
+        torque = bench.true_torque[:, v.joint]
+        spring = bench.lever[:, v.joint] * bench.compliance[v.joint]
+        turned = torque + v.least * bench.columns[v.columns[0]][: len(torque)] / spring
+        order = np.argsort(torque)
+        rise = np.diff(turned[order]) / np.maximum(np.diff(torque[order]), 1e-12)
+        apart = np.diff(torque[order]) > 1e-3 * np.ptp(torque)
+        assert rise[apart].min() > -1e-6
+        assert rise[apart].min() < 0.5

@@ -79,10 +79,16 @@ def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Varian
     free, root = [line, *columns], _root(len(hinges))
     label = f"joint {j + 1} curve"
     out = [variant(WORD, label, free, SCALES, root=root, prior=0.5, kinds=kinds, **info)]
-    for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
+    for name, shape, power in (
+        ("quadratic", x * np.abs(x), 2),
+        ("cubic", x**3, 3),
+        ("even", x**2, 0),
+    ):
+        # at the largest load some compliance is left; which end that is of an even one, none says
+        lawful = {"positive": True, "least": -1 / power} if power and not bench.imposed else {}
         column = bench.add_joint(j, c * shape)
-        label = f"joint {j + 1} {name}"
-        out.append(variant(WORD, label, [column], SCALES, prior=0.1, kinds=(name,), **info))
+        label, more = f"joint {j + 1} {name}", info | lawful
+        out.append(variant(WORD, label, [column], SCALES, prior=0.1, kinds=(name,), **more))
     seen, prior = _seen_from(bench, j, x), 0.2 / (len(PLACES) - 1)
     for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
         pair = hinges[k : k + 2]
