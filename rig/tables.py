@@ -332,20 +332,28 @@ class _Table:
         """InputError for rows in another order than they were measured in."""
         name = "session_s" if "session_s" in columns else "time_s"
         clock = columns[name]
-        back = np.flatnonzero(np.diff(clock) < 0)
-        # a clock of runs, or of steps, starts anew with each of them
-        if len(back) < _FEW or len(back) < _OUT_OF_ORDER[name] * (len(clock) - 1):
+        change, low = np.diff(clock), float(clock.min())
+        if len(clock) > _FEW and np.all(change <= 0) and np.any(change < 0):
+            raise InputError(
+                f"{self._path}: {name} counts down, from {clock[0]:g} to {clock[-1]:g} s. Turn it "
+                "round, so that it grows from sample to sample."
+            )
+        # one of runs, of steps or of days starts anew with each of them, at about its least
+        anew = clock[1:] <= low + _STARTS * float(np.ptp(clock))
+        back = np.flatnonzero((change < 0) & ~anew)
+        if len(back) < _FEW or len(back) < _OUT_OF_ORDER * (len(clock) - 1):
             return
         at = int(back[0])
         raise InputError(
             f"{self._path}: the rows are not in the order of measurement: {name} goes back "
-            f"{len(back)} times in {len(clock)} samples, first from {clock[at]:g} to "
-            f"{clock[at + 1]:g} s at sample {at + 2}. Sort the rows by the time they were taken "
-            "at."
+            f"{len(back)} times (but for starts anew) in {len(clock)} samples, first from "
+            f"{clock[at]:g} to {clock[at + 1]:g} s at sample {at + 2}. Sort the rows by the time "
+            "they were taken at."
         )
 
 
-_FEW, _OUT_OF_ORDER = 5, {"session_s": 0.1, "time_s": 0.4}  # times; shares of the steps
+_FEW, _OUT_OF_ORDER = 5, 0.1  # times; share of the steps
+_STARTS = 0.1  # of what a clock counts
 
 
 def _meant(near: str, unit: str) -> str:

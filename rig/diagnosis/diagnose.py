@@ -56,6 +56,7 @@ class Diagnosis:
             "dataset": self.dataset,
             "verdict": r.verdict,
             "nothing_learned": r.learned_nothing,
+            "displacement_met": r.met,
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},
             "meanings": meanings(arm=r.bench.data.arm),
             "effects": [_effect(e, r.bench.data) for e in r.effects],

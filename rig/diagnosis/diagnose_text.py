@@ -160,18 +160,10 @@ def _answer(r: GapResult) -> str:
     before, after, noise = (brief(v * MM_PER_M, 3) for v in (r.before, r.after, r.noise))
     like = None if r.looks_like is None else looks_like(r.looks_like, arm=r.bench.data.arm)
     meaning = meanings(arm=r.bench.data.arm).get(r.verdict, "")
-    met = within_noise(r.after, r.noise)
+    met = r.verdict == "unknown" and r.met
     told = answer(r.verdict, meaning, r.names, like, nothing=r.learned_nothing, met=met)
     shown = told.format(before=before, after=after, noise=noise)
     return f"{r.verdict} ({likely(r.probabilities[r.verdict])}): {shown}"
-
-
-def within_noise(after: float, noise: float) -> bool:
-    """Whether what is left is no more than noise, which is known to a fifth."""
-    return after <= _NOISE_TO * noise
-
-
-_NOISE_TO = 1.2
 
 
 def answer(

@@ -14,7 +14,6 @@ from rig.diagnosis.diagnose_text import (
     answer,
     families,
     less_datum,
-    within_noise,
 )
 from rig.report.document import (
     Block,
@@ -56,7 +55,7 @@ def _answer(found: Node) -> Rich:
         [e["name"].text() for e in found["effects"]],
         None if like.value is None else like["text"].text(),
         nothing=found["nothing_learned"].value,
-        met=within_noise(*(found["gap"][f"{k}_rms_mm"].value for k in ("after", "noise"))),
+        met=found["displacement_met"].value,
     )
     sizes = {k: found["gap"][f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise")}
     parts = re.split(r"\{(before|after|noise)\}", told)

@@ -94,7 +94,10 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
     }
     probabilities = {verdict: p, "base_slip": 0.9961 - p, "zero_shift": 0.0039}
     unseen = dict.fromkeys(("engine", "fit", "found"), NOWHERE)
-    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True, curves=None), still=False)
+    noise = SimpleNamespace(misjudged=False)
+    arm: Any = SimpleNamespace(
+        data=SimpleNamespace(arm=True, curves=None), still=False, noise=noise
+    )
     return GapResult(verdict=verdict, probabilities=probabilities, bench=arm, **known, **unseen)
 
 

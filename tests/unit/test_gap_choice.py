@@ -107,13 +107,15 @@ def test_a_larger_effect_that_is_one_of_several_alike_is_shown_beside_the_verdic
 
 
 @pytest.mark.parametrize(
-    ("worth", "largest", "named"), [(21.0, LAG, 2), (21.0, CURVE, 3), (91.0, LAG, 3)]
+    ("worth", "largest", "off", "named"),
+    [(21.0, LAG, 1.0, 2), (21.0, CURVE, 1.0, 3), (91.0, LAG, 1.0, 3), (21.0, LAG, 3.3, 3)],
 )
 def test_what_brings_too_little_to_lead_is_not_shown_as_the_largest(
-    worth: float, largest: str, named: int
+    worth: float, largest: str, off: float, named: int
 ) -> None:
-    """A third effect that takes the gap over from the two that the verdict is of."""
-    two = said({CURVE: 1.0, ASKEW: 0.5}, 0.0)
+    """A third effect that takes the gap over from the two that the verdict is of; but where springs
+    and gains that are off stand for it."""
+    two = replace(said({CURVE: 1.0, ASKEW: 0.5}, 0.0), off=off)
     sizes = {largest: 1.3, **{w: 1.0 for w in (CURVE, LAG) if w != largest}, ASKEW: 0.6}
     choice = chosen_of(found(two, said(sizes, worth)), CURVE)
     assert len(choice.shown.words) == named

@@ -19,6 +19,8 @@ from tests.unit.test_gap_forms import arm_data
         ("output", 0.5, []),  # springs twice as stiff
         ("output", 4.0, []),  # one that yields
         ("output", 0.0, ["fault"]),
+        ("output", np.pi / 180, ["fault"]),
+        ("output", -1.0, ["fault"]),
         ("motor", 0.0, []),
         ("motor", 1.0, ["remark"]),
         ("motor", 4.0, ["remark"]),
@@ -30,7 +32,14 @@ def test_readings_before_and_behind_the_gear(stated: str, share: float, kinds: l
     turned = share * lever * data.compliance * data.force[:, None]
     q = turned + 1e-5 * np.random.default_rng(0).standard_normal(turned.shape)
     bench = make_bench(replace(data, q=q, output_encoder=stated == "output"))
-    assert [n.kind for n in read_elsewhere(bench)] == kinds
+    said = read_elsewhere(bench)
+    assert [n.kind for n in said] == kinds
+    asks = {0.0: "before the gear?", np.pi / 180: "unit", -1.0: "signs"}.get(share, "")
+    assert all(asks in n.text for n in said)
+    loosely = replace(data, q=q, compliance_relative_sd=np.full(6, 20.0))  # springs of any size
+    assert share in (0.0, -1.0) or not any(
+        n.kind == "fault" for n in read_elsewhere(make_bench(loosely))
+    )
 
 
 def test_little_load_tells_no_side() -> None:

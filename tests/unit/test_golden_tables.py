@@ -169,7 +169,7 @@ def test_a_gap_that_nothing_may_explain_though_it_is_met_is_said_to_be_met(
 ) -> None:
     likely = {"unknown": 0.6, "none": 0.4}
     result = replace(shown.explained().result, verdict="unknown", effects=(), noise=1e-6)
-    result = replace(result, probabilities=likely)
-    text = diagnose_text.render(replace(result, after=after))
+    result = replace(result, probabilities=likely, after=after)
+    text = diagnose_text.render(result)
     assert ("is met without any effect" in text) is met
     assert ("there is a gap" in text) is not met

@@ -561,13 +561,22 @@ def test_fast_and_plain_reader_agree(
 
 @pytest.mark.parametrize("clock", ["session_s", "time_s"])
 def test_rows_out_of_order_are_refused(tmp_path: Path, clock: str) -> None:
-    mixed = np.random.default_rng(2).permutation(40)
-
-    def table(order: Iterable[int], each: int) -> str:
-        rows = "".join(f"{i % each},{i},{i / 7!r}\n" for i in order)
+    def table(times: Iterable[float]) -> str:
+        rows = "".join(f"{t},{i},{i / 7!r}\n" for i, t in enumerate(times))
         return f"{clock},force_N,displacement_mm\n" + rows
 
+    mixed = np.random.default_rng(2).permutation(40).tolist()
     with pytest.raises(InputError, match=f"not in the order of measurement: {clock} goes back"):
-        bring(tmp_path, table(mixed.tolist(), 40), example.META_SPECIMEN)
-    if clock == "time_s":  # which starts anew with every step
-        bring(tmp_path, table(range(40), 4), example.META_SPECIMEN)
+        bring(tmp_path, table(mixed), example.META_SPECIMEN)
+    with pytest.raises(InputError, match=f"{clock} counts down, from 39 to 0 s"):
+        bring(tmp_path, table(range(39, -1, -1)), example.META_SPECIMEN)
+
+
+@pytest.mark.parametrize("each", [2, 4, 8])
+@pytest.mark.parametrize("clock", ["session_s", "time_s"])
+def test_a_clock_may_start_anew_with_every_step_or_day(
+    tmp_path: Path, clock: str, each: int
+) -> None:
+    rows = "".join(f"{0.5 + i % each},{i},{i / 7!r}\n" for i in range(48))
+    table = f"{clock},force_N,displacement_mm\n" + rows
+    assert len(bring(tmp_path, table, example.META_SPECIMEN).columns["force_N"]) == 48

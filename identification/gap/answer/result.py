@@ -39,6 +39,7 @@ from identification.gap.recording.faults import SIGNS, SILENT
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
 # laws themselves are only families.
 ALIKE = 4.6
+_NOISE_TO = 1.2  # times the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,12 @@ class GapResult:
     def names(self) -> tuple[str, ...]:
         """Of the effects, each once: one mechanism may sit in several joints."""
         return tuple(dict.fromkeys(e.name for e in self.effects))
+
+    @property
+    def met(self) -> bool:
+        """Of an arm: what is left is no more than noise, which is known to a fifth."""
+        bench = self.bench
+        return bench.data.arm and not bench.noise.misjudged and self.after <= _NOISE_TO * self.noise
 
     @property
     def learned_nothing(self) -> bool:

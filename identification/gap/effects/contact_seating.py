@@ -172,15 +172,15 @@ def _one_after_the_other(
     return replace(plain, prior=_RUBBING).known_by(f", rubbing {share:.2g}", rubs=rubs)
 
 
-_SOFT_BY = 0.15  # of the largest force
+_SOFT_BY = 0.1  # of the largest force: of so much a fixture may be preloaded
 
 
 def _soft_first(grows: Array, forces: Array, top: float) -> Array:
-    """(m, k) sums that are not negative where the depth per force, once it is soft at all, only
+    """(m, k) sums that are not negative where what it gives per force, from a little load on, only
     falls from one force (k,) N to the next: what is stiff, then soft, then stiff again snaps."""
-    mean = np.cumsum(grows, axis=0) / forces[:, None] * forces[0]
-    here = np.flatnonzero(forces[:-1] >= _SOFT_BY * top * (1 - 1e-9))
-    return np.asarray(mean[here] - mean[here + 1])
+    depth, first = np.cumsum(grows, axis=0), int(np.argmin(np.abs(forces - _SOFT_BY * top)))
+    mean = (depth[first + 1 :] - depth[first]) / (forces[first + 1 :, None] - forces[first])
+    return np.asarray((mean[:-1] - mean[1:]) * forces[0])
 
 
 def _seated(

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
-from math import log
+from math import log, nan
 
 import numpy as np
 
@@ -52,14 +52,14 @@ LAW_REMAINDER = 0.03
 class Explanation:
     """Effects (largest first, none for the base alone), posterior weight as log, imperfection eta
     m, sizes (rms m) of the effects, and log share of the posterior with little remainder. off: by
-    how many standard deviations springs and gains are off at most, where that was looked up."""
+    how many standard deviations springs and gains are off at most; NaN where nobody looked."""
 
     parts: tuple[Part, ...]
     log_weight: float
     eta: float
     sizes: tuple[float, ...]
     log_good: float
-    off: float = 0.0
+    off: float = nan
 
     def sized(self, sizes: Iterable[float]) -> Explanation:
         """With other sizes (rms m) of its effects, the largest first."""

@@ -183,15 +183,16 @@ def simpler_of(
         and f.words < e.words
         and f.log_weight > e.log_weight - most
         and f.good
-        and f.off < ARM_AS_STATED
+        and not f.off >= ARM_AS_STATED
         and foresaw(kept, f.words)
     )
     return next(near, None)
 
 
 _TWO, _MANY = 2, 3
-# Standard deviations beyond which springs and gains of an arm are no uncertainty any more.
-ARM_AS_STATED = 4.0
+# Standard deviations to which springs and gains are as stated, and beyond which those of an arm are
+# uncertain no more: of arms without a fault none was off by 3 in 107 cases of the blind check.
+AS_STATED, ARM_AS_STATED = 3.0, 4.0
 
 
 def _tells_of_three(explanation: Explanation, ranked: Sequence[Explanation]) -> bool:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.explanations.verdict import (
+    AS_STATED,
     FLANKS,
     FORESAW,
     TAKES_TWO,
@@ -52,7 +53,7 @@ def chosen_of(found: SearchResult, verdict: str) -> Choice:
     held = [e for e in mine if foresees(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
-    best = _worthwhile(best, simpler)
+    best = _worthwhile(best, simpler, arm=found.engine.bench.data.arm)
     shown = _without_small(best, simpler, CLOSELY * found.engine.bench.noise.stated)
     shown = _as_it_speaks(found, shown, verdict)
     return Choice(shown, best if shown is not best else None)
@@ -61,12 +62,13 @@ def chosen_of(found: SearchResult, verdict: str) -> Choice:
 def _as_it_speaks(found: SearchResult, shown: Explanation, verdict: str) -> Explanation:
     """Of an arm: without the effect that would be larger than the verdict, where what is left
     speaks for both: so many nats may be how far its laws are off, and then it has no size of its
-    own."""
+    own. Not where springs and gains stand for it: then it has."""
     if not found.engine.bench.data.arm or next(iter(shown.troubles)) == verdict:
         return shown
     fewer = simpler_of(shown, found.explanations, found.kept, arm=True)
-    leads = fewer is not None and next(iter(fewer.troubles), "") == verdict
-    return fewer if fewer is not None and leads else shown
+    if fewer is None or not fewer.off < AS_STATED or next(iter(fewer.troubles)) != verdict:
+        return shown
+    return fewer
 
 
 def _without_small(best: Explanation, simpler: list[Explanation], most: float) -> Explanation:
@@ -105,19 +107,19 @@ def _needless(found: SearchResult, explanation: Explanation) -> bool:
     return simpler is not None and not (explanation.words - simpler.words) & BETWEEN_RUNS
 
 
-def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
+def _worthwhile(best: Explanation, simpler: list[Explanation], *, arm: bool) -> Explanation:
     """With no effect that brings less than it has to."""
     while True:
         fewer = [e for e in simpler if e.words < best.words and len(e.words) == len(best.words) - 1]
-        near = [e for e in fewer if e.log_weight > best.log_weight - _worth(best, e)]
+        near = [e for e in fewer if e.log_weight > best.log_weight - _worth(best, e, arm=arm)]
         if not near:
             return best
         best = max(near, key=lambda e: e.log_weight)
 
 
-def _worth(explanation: Explanation, fewer: Explanation) -> float:
+def _worth(explanation: Explanation, fewer: Explanation, *, arm: bool) -> float:
     """Nats that the effect has to bring that the one has and the other one, with fewer, has not."""
-    if explanation.words - fewer.words <= FLANKS and flanks_of_one_joint(explanation):
+    if arm and explanation.words - fewer.words <= FLANKS and flanks_of_one_joint(explanation):
         return WORTH_OF_FLANK
     return WORTH if len(explanation.words) <= _TWO else WORTH_OF_THIRD
 

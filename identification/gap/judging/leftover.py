@@ -24,6 +24,7 @@ from identification.gap.explanations.explanation import (
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import (
     ARM_AS_STATED,
+    AS_STATED,
     may_inherit,
     may_miss,
     with_posterior,
@@ -131,9 +132,6 @@ def _less_likely(explanation: Explanation, nats: float) -> Explanation:
     return replace(e, log_weight=e.log_weight - nats, log_good=e.log_good - nats)
 
 
-# Standard deviations. Of the springs and gains of arms without a fault none was off by 3 in 107
-# cases of the blind check.
-AS_STATED = 3.0
 # Nats against an arm's explanations by linear effects alone where all is explained without them as
 # it was stated: what springs and gains do within that is no fault. Of 245 linear faults of the
 # blind check that do three times the noise six gains alone lay there, which have bounds of their

@@ -85,13 +85,13 @@ def _goes(read: Array, stated: float) -> bool:
 
 
 def waited(bench: Bench) -> Flags:
-    """(n,) rows of the one hold that most of the session went by in; none where there is none. What
-    goes by between two runs goes by without a load."""
+    """(n,) rows of the one hold that most of the time of all runs went by in; none where there is
+    none. What goes by between two runs goes by without a load."""
     rows = bench.rows
     after = np.where(np.append(rows.starts[1:], True), 0.0, np.diff(rows.session, append=0.0))
     span = np.bincount(rows.hold, after)
     longest = int(span.argmax())
-    return np.asarray((rows.hold == longest) & (span[longest] > 0.5 * bench.course.session_span))
+    return np.asarray((rows.hold == longest) & (span[longest] > 0.5 * after.sum()))
 
 
 def hangs(bench: Bench) -> bool:
