@@ -15,11 +15,16 @@ from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 
 
+def springs(data: GapData) -> Array:
+    """(n,) m/N of the arm's springs."""
+    return np.array([s.lever**2 @ data.compliance for s in data.setups])[data.setup]
+
+
 def moved(data: GapData, by: Array) -> GapData:
     """The arm on its springs, and moved (n,) m beside them."""
-    springs = np.array([s.lever**2 @ data.compliance for s in data.setups])[data.setup]
     noise = 1e-6 * np.random.default_rng(1).standard_normal(len(by))
-    return replace(data, displacement=springs * data.force + by + noise, q=None, tangential=None)
+    given = springs(data) * data.force + by + noise
+    return replace(data, displacement=given, q=None, tangential=None)
 
 
 def steps(data: GapData) -> tuple[Array, Array]:
@@ -38,9 +43,8 @@ def test_what_is_ahead_of_the_load_does_not_lag(late: bool) -> None:
     """The first reading of every hold: a tenth of the step too far, as a hand leaves it, or too
     little."""
     data = arm_data()
-    springs = np.array([s.lever**2 @ data.compliance for s in data.setups])[data.setup]
     change, first = steps(data)
-    off = springs * change * first * (-0.3 if late else 0.1)
+    off = springs(data) * change * first * (-0.3 if late else 0.1)
     assert (explained(moved(data, off)).verdict == "time_lag") is late
 
 

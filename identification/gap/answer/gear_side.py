@@ -22,8 +22,7 @@ def read_elsewhere(bench: Bench) -> tuple[Note, ...]:
     data, rows = bench.data, bench.rows
     if not data.arm or rows.q is None:
         return ()
-    lever = np.stack([s.lever for s in data.setups])[rows.setup]
-    turned = rows.about_means(lever * data.compliance * rows.measured_force[:, None])
+    turned = rows.about_means(bench.lever * data.compliance * rows.measured_force[:, None])
     read = rows.about_means(rows.q)
     square, product, own = (
         float(np.sum(rows.weight[:, None] * a * b))
@@ -34,7 +33,9 @@ def read_elsewhere(bench: Bench) -> tuple[Note, ...]:
     share, alike = product / square, product**2 > _ALIKE * square * own
     left = own - share * product
     least = min(_BEFORE, 1 / (1 + _SURELY * float(data.compliance_relative_sd.max())))
-    told = f"Under load the joints are read to turn by {100 * share:.0f} % of what their springs "
+    told = (
+        f"Under load the joints are read to turn by {round(100 * share)} % of what their springs "
+    )
     if data.output_encoder and alike and share < -_BEFORE:
         return (Note(FAULT, f"{told}give: the other way. See to the signs of the readings."),)
     if data.output_encoder and share < least and square > _PLAIN**2 * left:
