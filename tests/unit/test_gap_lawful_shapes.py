@@ -10,9 +10,10 @@ import pytest
 from identification.arrays import Array
 from identification.gap.data import GapData
 from identification.gap.effects import library
-from identification.gap.model.bench import make_bench
+from identification.gap.model.bench import Bench, make_bench
 from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_running import running, triangle
 
 
 def springs(data: GapData) -> Array:
@@ -56,20 +57,47 @@ def test_what_is_stiff_then_soft_then_stiff_again_is_no_seat() -> None:
     assert explained(moved(data, snaps)).verdict != "contact_seating"
 
 
-@pytest.mark.parametrize("name", ["quadratic", "cubic"])
+CURVES = ("curve", "quadratic", "cubic", "even", "bend 0.5", "odd curve, tool 1.5 kg")
+
+
+@pytest.mark.parametrize("name", CURVES)
 def test_a_curve_that_goes_back_under_more_load_is_none(name: str) -> None:
-    """The least of it leaves no compliance at the largest load, and some at any other."""
+    """With one coefficient at the limit of what is allowed a joint hardly gives at some load, and
+    goes back at none."""
     bench = make_bench(arm_data())
     some = [v for v in library(bench, ["joint_nonlinear_stiffness"]) if v.label.endswith(name)]
     assert some
     for v in some:
-        assert v.positive is not None
         assert v.joint is not None
-        torque = bench.true_torque[:, v.joint]
-        spring = bench.lever[:, v.joint] * bench.compliance[v.joint]
-        turned = torque + v.least * bench.columns[v.columns[0]][: len(torque)] / spring
-        order = np.argsort(torque)
-        rise = np.diff(turned[order]) / np.maximum(np.diff(torque[order]), 1e-12)
-        apart = np.diff(torque[order]) > 1e-3 * np.ptp(torque)
-        assert rise[apart].min() > -1e-6
-        assert rise[apart].min() < 0.5
+        for i in range(len(v.columns)):
+            signed = v.within[:, i] != 0
+            limits = v.floor[signed] / v.within[signed, i]
+            either = limits[limits < 0].max(initial=-np.inf), limits[limits > 0].min(initial=np.inf)
+            column = bench.columns[v.columns[i]]
+            left = [gives(bench, v.joint, w * column) for w in either if np.isfinite(w)]
+            assert 0.0 < min(left) < (0.5 if i == 0 else 1.0)
+
+
+def gives(bench: Bench, joint: int, by: Array) -> float:
+    """The least by which a joint turns further under more torque, on its spring and moved by what a
+    column (size,) does to the target, over what it turns on the spring."""
+    out, torque = np.inf, bench.true_torque[:, joint]
+    spring = bench.lever[:, joint] * bench.compliance[joint]
+    for s in range(len(bench.data.setups)):
+        mine = np.flatnonzero(bench.rows.setup == s)
+        mine = mine[np.argsort(torque[mine])]
+        step = np.diff(torque[mine])
+        turned = torque[mine] + by[mine] / spring[mine]
+        apart = step > 1e-2 * np.ptp(torque)
+        out = min(out, float((np.diff(turned)[apart] / step[apart]).min(initial=np.inf)))
+    return out
+
+
+def test_a_displacement_that_is_imposed_may_be_resisted_less_and_less() -> None:
+    """Foams and shells do, and are elastic: what falls too far is judged by what it leaves."""
+    stroke = 1e-3 * triangle(400, 2.5)
+    bench = make_bench(running(1e5 * stroke, stroke, imposed="displacement"))
+    assert bench.imposed
+    some = library(bench, ["joint_nonlinear_stiffness"])
+    assert some
+    assert not any(len(v.floor) and v.floor.min() < 0 for v in some)

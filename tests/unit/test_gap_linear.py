@@ -41,7 +41,7 @@ def charged(v: Variant, w: list[float], sd: float = 0.01) -> float:
     limits = Limits.of([v])
     assert limits is not None
     rows = limits.rows
-    before = np.array([np.linalg.norm(rows[0, 0])])
+    before = np.linalg.norm(rows, axis=2)
     return float(log_odds(limits, np.zeros(1, int), before, rows @ np.array(w), sd * rows)[0])
 
 

@@ -20,6 +20,7 @@ from identification.gap.evidence.finer import gained
 from identification.gap.evidence.imperfection import least_size, log_share
 from identification.gap.evidence.parts import Part, log_joint_between, log_joints, signs_kept
 from identification.gap.evidence.signs import (
+    Kept,
     Limits,
     all_kept,
     distance,
@@ -55,8 +56,7 @@ def test_a_distance_is_found_where_its_first_solver_gives_up(
 def odds(mean: Array, covariance: Array, prior: Array, **limits: object) -> float:
     v = variant("joint_yield", "v", list(range(len(mean))), (1.0,), **limits)  # type: ignore[arg-type]
     found = Limits.of([v])
-    first = found.rows[0, 0]
-    before = np.array([np.sqrt(first @ prior @ first)])
+    before = np.sqrt(np.einsum("vmi,ij,vmj->vm", found.rows, prior, found.rows))
     roots = found.rows @ np.linalg.cholesky(covariance)
     return float(log_odds(found, np.zeros(1, int), before, found.rows @ mean, roots)[0])
 
@@ -73,6 +73,18 @@ def sampled(mean: Array, covariance: Array, prior: Array, rows: Array, least: fl
 
 
 ALONE = np.array([[1.0]])
+UNIT = np.ones((1, 1))  # how far sums went in the prior, where half of it keeps them anyway
+
+
+def test_a_sum_may_be_below_zero_where_its_floor_is() -> None:
+    """Far above the floor costs nothing, below it as much as the share that is left of all that
+    the prior had there."""
+    floor, rows = np.array([-0.9]), np.array([[1.0, 1.0]])
+    free = {"positive": False, "within": rows, "floor": floor}
+    covariance = 0.02 * np.eye(2)  # of the sum 0.2^2
+    assert odds(np.array([-0.3, -0.3]), covariance, np.eye(2), **free) == 0.0
+    found = odds(np.array([-1.0, -0.3]), covariance, np.eye(2), **free)
+    assert found == pytest.approx(log_ndtr(-0.4 / 0.2) - log_ndtr(0.9 / 2**0.5))
 
 
 def test_one_coefficient_and_its_sign_are_exact() -> None:
@@ -84,7 +96,7 @@ def test_one_coefficient_and_its_sign_are_exact() -> None:
 def test_no_limit_costs_nothing() -> None:
     free = Limits.of([variant("joint_yield", "v", [0, 1], (1.0,), positive=False)])
     sums, roots = np.full((1, 1), -9.0), np.ones((1, 1, 2))
-    assert log_odds(free, np.zeros(1, dtype=int), np.ones(1), sums, roots) == 0.0
+    assert log_odds(free, np.zeros(1, dtype=int), np.ones((1, 1)), sums, roots) == 0.0
 
 
 def test_one_coefficient_may_not_pay_for_another_with_the_wrong_sign() -> None:
@@ -122,12 +134,12 @@ def test_limits_that_two_by_two_are_near_may_be_far_together() -> None:
     v = variant("joint_yield", "v", [0, 1, 2], (1.0,), each=True, positive=np.array([1.0, 0, 0]))
     limits = Limits.of([v])
     roots = limits.rows @ np.linalg.cholesky(covariance)
-    found = log_odds_together(limits, np.zeros(1, int), limits.rows @ mean, roots)[0]
+    found = log_odds_together(limits, np.zeros(1, int), UNIT, limits.rows @ mean, roots)[0]
     assert found == pytest.approx(log_ndtr(-minimum(mean, covariance)) + 4 * np.log(2))
     assert found < -1000.0
-    more = Limits(limits.rows, np.array([0.5]), limits.asked)
+    more = Limits(limits.rows, limits.floor + np.array([0.5, 0, 0, 0]), limits.asked)
     sums = limits.rows @ mean
-    assert log_odds_together(more, np.zeros(1, int), sums, roots)[0] < found - 10.0
+    assert log_odds_together(more, np.zeros(1, int), UNIT, sums, roots)[0] < found - 10.0
 
 
 def test_limits_each_hardly_broken_may_be_far_from_all_kept() -> None:
@@ -143,7 +155,7 @@ def test_limits_each_hardly_broken_may_be_far_from_all_kept() -> None:
         mean = np.linalg.lstsq(np.vstack([np.ones(5), radius]), np.array([3.0, 3 * centre]))[0]
         sums = limits.rows @ mean
         assert (sums / np.linalg.norm(roots, axis=2)).min() > -0.5
-        found = log_odds_together(limits, np.zeros(1, int), sums, roots)[0]
+        found = log_odds_together(limits, np.zeros(1, int), UNIT, sums, roots)[0]
         assert (found > 0) == free
         assert free or found < -1000.0
 
@@ -158,15 +170,15 @@ def test_one_limit_that_is_broken_may_ask_others_to_be_so(first: float, looks: b
     v = variant("joint_yield", "v", [0, 1], (1.0,), each=True, positive=np.array([0.0, 1]))
     limits = Limits.of([v])
     roots = limits.rows @ np.linalg.cholesky(covariance)
-    found = log_odds_together(limits, np.zeros(1, int), limits.rows @ mean, roots)[0]
+    found = log_odds_together(limits, np.zeros(1, int), UNIT, limits.rows @ mean, roots)[0]
     assert np.isfinite(found) == looks
     assert first > -1 or found < -15.0
 
 
 def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[list[tuple[Array, Array]]] = []
+    asked: list[list[Kept]] = []
 
-    def kept(limits: list[tuple[Array, Array]]) -> float:
+    def kept(limits: list[Kept]) -> float:
         asked.append(limits)
         return -1e6
 
@@ -177,8 +189,11 @@ def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch
     assert signs_kept(engine.levels[0], (parts[0], parts[1])) == -1e6
     below = [replace(p, variant=replace(p.variant, least=0.0)) for p in parts]
     signs_kept(engine.levels[0], (below[0], below[1]))
-    first, second = ([float(sums[0]) for sums, _ in limits] for limits in asked)
+    first, second = ([float(kept.sums[0]) for kept in limits] for limits in asked)
     assert np.subtract(second, first) == pytest.approx([0.5, 1.5])
+    first, second = ([float(kept.log_shares[0]) for kept in limits] for limits in asked)
+    assert second == pytest.approx([-np.log(2)] * 2)  # of the prior half is above zero
+    assert max(first) < -np.log(2) - 0.1
     assert signs_kept(engine.levels[0], (free,)) == 0.0
 
 
@@ -198,7 +213,8 @@ def minimum(mean: Array, covariance: Array) -> float:
 def test_parts_that_keep_their_limits_alone_may_not_together() -> None:
     """Two parts share a sum: one can be positive, or the other."""
     off = -0.5 * np.ones(1)
-    limits = [(off, np.array([[1.0, 0.0]])), (off, np.array([[-1.0, 0.01]]))]
+    half = np.log(0.5) * np.ones(1)
+    limits = [Kept(off, np.array([root]), half) for root in ([1.0, 0.0], [-1.0, 0.01])]
     assert min(all_kept([one]) for one in limits) > -2.0
     assert all_kept(limits) < -1000.0
 
@@ -309,10 +325,11 @@ def test_many_means_at_once_are_as_far_as_each_alone() -> None:
     roots = draw.normal(size=(n, m, m))
     roots[:, 1] = roots[:, 0] + 1e-3 * roots[:, 1]  # two are nearly one
     sums = draw.normal(-0.5, 2.0, (n, m))
-    limits = Limits(np.zeros((n, m, m)), np.zeros(n), asked)
-    found = log_odds_together(limits, np.arange(n), sums, roots)
+    limits = Limits(np.zeros((n, m, m)), np.zeros((n, m)), asked)
+    found = log_odds_together(limits, np.arange(n), UNIT.repeat(n, axis=0), sums, roots)
     looked = np.flatnonzero(np.isfinite(found))
     assert len(looked) > n / 2
     for i in looked:
-        alone = all_kept([(sums[i, asked[i]], roots[i, asked[i]])])
+        half = np.full(asked[i].sum(), np.log(0.5))
+        alone = all_kept([Kept(sums[i, asked[i]], roots[i, asked[i]], half)])
         assert found[i] == pytest.approx(alone, rel=1e-5, abs=1e-5)

@@ -154,6 +154,7 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
         prior=0.3,
         each=stand.each,
         within=within,
+        floor=np.append(stand.floor, np.zeros(len(bent))),
         **{**stand.info, "bends_Nm": bends},
     )
 

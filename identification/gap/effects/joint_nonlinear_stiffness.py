@@ -5,7 +5,8 @@ The deflection beyond the linear spring is a smooth curve of the torque: hinges
 compliance. A joint that carries the arm's weight has its curve over the net torque, which is the
 same only while it is pushed to one side in one pose. Gear catalogues: K3/K1 = 1.5 to 1.85.
 
-Size: K3/K1 = 1.5 to 1.85 in gears; 5 to 100 % of the compliance allowed, either sign.
+Size: K3/K1 = 1.5 to 1.85 in gears; 5 to 100 % of the compliance allowed, either sign. A load that
+grows moves it further: of the compliance a twentieth is left at least.
 Prior: curve smooth, either sign, sd out of SCALES, equally likely; half to three quarters of it
 on free curves.
 Source: three-part stiffness in catalogues of strain wave gears.
@@ -20,27 +21,27 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.laws import elastic_law
 from identification.gap.laws.closer import Word, closing_in
-from identification.gap.laws.curves import above, beyond, from_level_to_level, hinge
+from identification.gap.laws.curves import above, beyond, hinge
 from identification.gap.laws.effect import Effect
+from identification.gap.laws.elastic_forms import (
+    FINE_SCALES,
+    SCALES,
+    WORD,
+    curve,
+    fine,
+    further,
+    level_by_level,
+    locks,
+)
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Laws
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.variants import Variant, smooth_root, variant
+from identification.gap.model.variants import Variant, variant
 
-WORD = "joint_nonlinear_stiffness"
 BEND = "bend"  # a form: one bend, between neighbouring places
 # Closer at the start: contacts are soft where they begin to bear, as `|tau|^(2/3)` (Hertz 1882).
 HINGES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of corners; of all of the net torque
-SCALES = (0.05, 0.15, 0.4, 1.0)
-# Of a rig without an arm, where rubber locks and foam buckles and is squeezed flat: close together
-# at both ends of the range, and up to a hundred times stiffer.
-FINE = (
-    *(0.01, 0.02, 0.035, 0.05, 0.075),
-    *(0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
-    *(0.86, 0.91, 0.95, 0.98),
-)
-FINE_SCALES = (0.15, 1.0, 6.0, 40.0)
 ALONG = tuple(k / 24 for k in range(1, 24))  # of all of the range, where it goes both ways
 
 
@@ -57,11 +58,11 @@ def variants(bench: Bench) -> list[Variant]:
         line = bench.add_joint(j, bench.compliance[j] * top * (torque / top))
         out += _alike_both_ways(bench, j, line, top)
         if not bench.data.arm and bench.course.once and not bench.course.rests:
-            out += _locks(bench, j, line, top) + _level_by_level(bench, j, line, top)
+            out += locks(bench, j, line, top) + level_by_level(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
-            out.append(_fine(bench, j, line, top))
+            out.append(fine(bench, j, line, top))
         if _both_ways(bench, j):
-            out.append(_uneven(bench, j, line, top))
+            out.append(_uneven(bench, j, line))
         if bench.feels_weight(j):
             out += _net(bench, j, line)
     return out
@@ -74,28 +75,23 @@ def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Varian
     # a specimen that settles in its clamps has no contact inside
     hinges = HINGES if bench.data.arm else PLACES
     columns = [bench.add_joint(j, c * hinge(x, b)) for b in hinges]
-    info: dict[str, Any] = {"joint": j, "torque": top, "hinges": hinges, "positive": False}
-    kinds = ("line", *hinges)
-    free, root = [line, *columns], _root(len(hinges))
-    label = f"joint {j + 1} curve"
-    out = [variant(WORD, label, free, SCALES, root=root, prior=0.5, kinds=kinds, **info)]
-    for name, shape, power in (
-        ("quadratic", x * np.abs(x), 2),
-        ("cubic", x**3, 3),
-        ("even", x**2, 0),
+    exact: dict[str, Any] = {"torque": top, "hinges": hinges}
+    out = [curve(bench, j, "curve", [line, *columns], hinges, prior=0.5, **exact)]
+    for name, shape, ends in (  # what they have more for a slope at the ends of the range
+        ("quadratic", x * np.abs(x), np.full((1, 1), 2.0)),
+        ("cubic", x**3, np.full((1, 1), 3.0)),
+        ("even", x**2, 2 * np.array([[x.min()], [x.max()]])),
     ):
-        # at the largest load some compliance is left; which end that is of an even one, none says
-        lawful = {"positive": True, "least": -1 / power} if power and not bench.imposed else {}
-        column = bench.add_joint(j, c * shape)
-        label, more = f"joint {j + 1} {name}", info | lawful
-        out.append(variant(WORD, label, [column], SCALES, prior=0.1, kinds=(name,), **more))
+        column, label = bench.add_joint(j, c * shape), f"joint {j + 1} {name}"
+        facts = {"joint": j, "kinds": (name,), "positive": False, **exact, **further(bench, ends)}
+        out.append(variant(WORD, label, [column], SCALES, prior=0.1, **facts))
     seen, prior = _seen_from(bench, j, x), 0.2 / (len(PLACES) - 1)
     for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
         pair = hinges[k : k + 2]
         if np.mean(pair) >= seen:
-            label, both = f"joint {j + 1} {BEND} {pair[0]}", [line, *columns[k : k + 2]]
-            exact = {"kinds": ("line", *pair), "form": BEND, **info}
-            out.append(variant(WORD, label, both, SCALES, prior=prior, **exact))
+            name, both = f"{BEND} {pair[0]}", [line, *columns[k : k + 2]]
+            facts = {"root": np.eye(3), "form": BEND, "prior": prior, **exact}
+            out.append(curve(bench, j, name, both, pair, **facts))
     return out
 
 
@@ -103,50 +99,34 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
     """Curves of the net torque: alike in both senses, which tells most where it passes zero, for
     several masses of the tool; and free over all of its range, so that nobody need know weights
     well (none where the joint is pushed to one side only, under one weight)."""
-    torque, weight, c = bench.true_torque[:, j], bench.weight(j), bench.compliance[j]
-    top, net = float(np.abs(torque).max()), torque + weight
-    info: dict[str, Any] = {"joint": j, "torque": top}
+    torque, weight = bench.true_torque[:, j], bench.weight(j)
     out = [_odd(bench, j, line, kg, 0.3 / len(TOOLS_KG)) for kg in TOOLS_KG]
     if bench.meets_weight_unlike(j):
+        net = torque + weight
         places = float(net.min()) + float(np.ptp(net)) * np.array(PLACES)
-        columns = [bench.add_joint(j, c * above(torque, weight, b)) for b in places]
-        kinds = ("line", *(("above", float(b)) for b in places))
-        out.append(
-            variant(
-                WORD,
-                f"joint {j + 1} curve of the net torque",
-                [line, *columns],
-                SCALES,
-                root=_root(len(places)),
-                positive=False,
-                prior=0.4,
-                kinds=kinds,
-                tool_kg=TOOL_KG,
-                **info,
-            )
-        )
+        out.append(_above(bench, j, line, "curve of the net torque", places, SCALES))
     return out
+
+
+def _above(
+    bench: Bench, j: int, line: int, name: str, places: Array, scales: tuple[float, ...]
+) -> Variant:
+    """A free curve of the net torque, with hinges at places (k,) Nm."""
+    torque, weight, c = bench.true_torque[:, j], bench.weight(j), bench.compliance[j]
+    columns = [line, *(bench.add_joint(j, c * above(torque, weight, b)) for b in places)]
+    kinds = [("above", float(b)) for b in places]
+    exact: dict[str, Any] = {"tool_kg": TOOL_KG, "torque": float(np.abs(torque).max())}
+    return curve(bench, j, name, columns, kinds, scales=scales, prior=0.4, **exact)
 
 
 def _odd(bench: Bench, j: int, line: int, kg: float, prior: float) -> Variant:
     torque, hung, c = bench.true_torque[:, j], bench.weight(j, kg), bench.compliance[j]
-    most = float(np.abs(torque + hung).max())
-    columns = [bench.add_joint(j, c * beyond(torque, hung, b * most)) for b in HINGES]
-    kinds = ("line", *(("beyond", b * most) for b in HINGES))
-    return variant(
-        WORD,
-        f"joint {j + 1} odd curve, tool {kg:.3g} kg",
-        [line, *columns],
-        SCALES,
-        root=_root(),
-        positive=False,
-        prior=prior,
-        kinds=kinds,
-        tool_kg=kg,
-        joint=j,
-        torque=float(np.abs(torque).max()),
-        line=line,
-    )
+    places = [b * float(np.abs(torque + hung).max()) for b in HINGES]
+    columns = [line, *(bench.add_joint(j, c * beyond(torque, hung, b)) for b in places)]
+    kinds = [("beyond", b) for b in places]
+    exact: dict[str, Any] = {"tool_kg": kg, "torque": float(np.abs(torque).max()), "line": line}
+    name = f"odd curve, tool {kg:.3g} kg"
+    return curve(bench, j, name, columns, kinds, prior=prior, **exact)
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
@@ -173,21 +153,8 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
         if b < seen:
             continue
         columns = [found.columns[0], bench.add_joint(j, c * hinge(x, b))]
-        out.append(
-            variant(
-                WORD,
-                f"joint {j + 1} corner {b:.3g}",
-                columns,
-                SCALES,
-                root=np.eye(2),
-                positive=False,
-                prior=share,
-                kinds=("line", b),
-                joint=j,
-                torque=top,
-                hinges=(b,),
-            )
-        )
+        exact: dict[str, Any] = {"torque": top, "hinges": (b,), "prior": share}
+        out.append(curve(bench, j, f"corner {b:.3g}", columns, (b,), root=np.eye(2), **exact))
     return out
 
 
@@ -222,13 +189,6 @@ _ABOUT = np.linspace(-0.08, 0.08, 9)  # of the range
 _TOOL_STEPS_KG = np.array([-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4])
 
 
-def _root(hinges: int = len(HINGES)) -> Array:
-    """Prior of a line and hinges."""
-    root = np.zeros((hinges + 1,) * 2)
-    root[0, 0], root[1:, 1:] = 1.0, smooth_root(hinges, 0.5)
-    return root
-
-
 TOOLS_KG = (0.5, 1.5, 2.5)
 
 
@@ -250,116 +210,11 @@ def _both_ways(bench: Bench, j: int) -> bool:
     return course.crosses_its_zero or (course.unloads and course.passes > 2)
 
 
-def _level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
-    """A curve of no simple form, of a table that shows nothing else."""
-    if not bench.course.only_a_curve:
-        return []
-    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
-    places = np.unique(np.append(np.abs(x), 0.0))
-    columns = [bench.add_joint(j, c * hinge(x, b)) for b in places[1:-1]]
-    return [
-        variant(
-            WORD,
-            f"joint {j + 1} curve from level to level",
-            [line, *columns],
-            SCALES,
-            root=from_level_to_level(places),
-            positive=False,
-            prior=0.5,
-            kinds=("line", *places[1:-1].tolist()),
-            joint=j,
-            torque=top,
-        )
-    ]
-
-
-def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
+def _uneven(bench: Bench, j: int, line: int) -> Variant:
     """A curve that pull and push have each its own, or that lies off the zero of either."""
-    x, c, arm = bench.true_torque[:, j], bench.compliance[j], bench.data.arm
+    x, arm = bench.true_torque[:, j], bench.data.arm
     places = float(x.min()) + float(np.ptp(x)) * np.array(PLACES if arm else ALONG)
-    columns = [bench.add_joint(j, c * above(x, bench.weight(j), b)) for b in places]
-    kinds = ("line", *(("above", float(b)) for b in places))
-    scales = SCALES if arm else FINE_SCALES
-    return variant(
-        WORD,
-        f"joint {j + 1} uneven curve",
-        [line, *columns],
-        scales,
-        root=_root(len(places)),
-        positive=False,
-        prior=0.4,
-        kinds=kinds,
-        tool_kg=TOOL_KG,
-        joint=j,
-        torque=top,
-    )
-
-
-def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
-    """A curve of FINE hinges."""
-    places, columns = _finely(bench, j, top)
-    return variant(
-        WORD,
-        f"joint {j + 1} fine curve",
-        [line, *columns],
-        FINE_SCALES,
-        root=_root(len(places)),
-        positive=False,
-        prior=0.5,
-        kinds=("line", *places),
-        form="fine",
-        joint=j,
-        torque=top,
-        hinges=places,
-    )
-
-
-def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
-    """Of a single pull, in which a free curve would pass for anything: what only gets stiffer,
-    however late and steeply, as nothing that flows does; under a driven force, which finds what is
-    soft in its first readings, also however early. Two neighbouring shapes out of FINE hinges."""
-    places, columns = _finely(bench, j, top)
-    b = np.array(places)
-    shapes = {f"locks {p}": p * (p - 1) * b ** (p - 2) for p in STEEPER}
-    if not bench.imposed:
-        shapes = {f"stops {e:g}": (np.array(FINE) + e) ** -3 for e in EARLY} | shapes
-    bends = [shape * np.gradient(b) for shape in shapes.values()]
-    bends = [w / (w @ (1 - b)) for w in bends]
-    out = []
-    for low, high, name in zip(bends, bends[1:], shapes, strict=False):
-        both = np.column_stack([low, high])
-        root = np.zeros((len(b) + 1,) * 2)
-        root[0, 0], root[1:, 1:3] = 1.0, both
-        powers = -bench.sense * np.column_stack([np.zeros(2), np.linalg.pinv(both)])
-        out.append(
-            variant(
-                WORD,
-                f"joint {j + 1} {name}",
-                [line, *columns],
-                FINE_SCALES,
-                root=root,
-                positive=powers.sum(axis=0),
-                within=powers,
-                prior=(0.25 if "stops" in name else 0.5) / (len(STEEPER) - 1),
-                kinds=("line", *places),
-                joint=j,
-                torque=top,
-                hinges=places,
-            )
-        )
-    return out
-
-
-STEEPER = (2, 3, 5, 9, 17, 33)  # powers of the load
-EARLY = (0.01, 0.03, 0.1, 0.3)  # b of `x / (x + b)`, of the range of the load
-
-
-def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[int]]:
-    """Places of FINE hinges, from where the load begins if it stays on one side, and columns."""
-    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
-    start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
-    places = tuple(round(start + b * (1 - start), 6) for b in FINE)
-    return places, [bench.add_joint(j, c * hinge(x, b)) for b in places]
+    return _above(bench, j, line, "uneven curve", places, SCALES if arm else FINE_SCALES)
 
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:

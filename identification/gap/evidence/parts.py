@@ -11,7 +11,7 @@ from identification.gap.evidence.compare import logsumexp, mean_square
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import level_priors
-from identification.gap.evidence.signs import Limits, all_kept, log_odds
+from identification.gap.evidence.signs import Kept, Limits, all_kept, log_odds, log_shares
 from identification.gap.model.variants import Variant, block
 from identification.gap.words import BETWEEN_RUNS, LINEAR
 
@@ -149,18 +149,19 @@ def signs_kept(level: NoiseLevel, parts: tuple[Part, ...]) -> float:
     roots = np.linalg.solve(factor, root.T)  # of the covariance
     w = roots.T @ np.linalg.solve(factor, root.T @ level.moment[columns])
     out, start = 0.0, 0
-    asked: list[tuple[Array, Array]] = []
+    asked: list[Kept] = []
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
-        if p.variant.positive is not None:
-            limits = _limits(level.engine, p.variant)
-            before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
+        limits = _limits(level.engine, p.variant)
+        which = limits.asked[0]
+        if which.any():
             rows = limits.rows
+            before = np.linalg.norm(rows @ p.root, axis=2)
             sums, spread = rows @ w[s], rows @ roots[:, s].T
             out += min(0.0, float(log_odds(limits, _ONE, before, sums, spread)[0]))
-            sums[0, 0] -= limits.least[0]
-            asked.append((sums[0], spread[0]))
+            share = log_shares(limits, _ONE, before)[0, which]
+            asked.append(Kept((sums[0] - limits.floor[0])[which], spread[0, which], share))
     return min(out, all_kept(asked)) if asked else out
 
 

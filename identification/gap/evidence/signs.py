@@ -2,18 +2,17 @@
 that does, over that of the prior.
 
 The first limit, on a sum of coefficients, has its exact share of the normal distribution. Further
-ones (single coefficients above zero, a place within its play) count as independent, but together
-with the first never for more than the half-space nearest to the mean that holds both: a convex set
-at Mahalanobis distance d has at most the share Phi(-d). Where only the sum of two is known, one may
-not turn negative to pay for the other.
+ones (single coefficients above zero, a place within its play, a stiffness that is left) count as
+independent, but together with the first never for more than the half-space nearest to the mean that
+holds both: a convex set at Mahalanobis distance d has at most the share Phi(-d). Where only the sum
+of two is known, one may not turn negative to pay for the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,42 +20,43 @@ from numpy.typing import NDArray
 from identification.arrays import Array, Flags, Ints
 from identification.gap.model.variants import Variant
 
-_TINY, _LOG_2 = 1e-300, log(2)
+_TINY = 1e-300
 _NEAR = 1 - 1e-9  # as correlated as two may be
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Of v variants with k coefficients w: rows (v, m, k), `rows w > 0` where asked (v, m), but for
-    the first, `rows[0] w > least` (v,)."""
+    """Of v variants with k coefficients w: rows (v, m, k), `rows w > floor` (v, m) where asked
+    (v, m)."""
 
     rows: Array
-    least: Array
+    floor: Array
     asked: Flags
 
     @classmethod
     def of(cls, variants: Sequence[Variant], k: int | None = None) -> Limits:
         """k: coefficients, where that is more than any of them has."""
         k = k or max(len(v.columns) for v in variants)
-        most = max(0 if v.positive is None else sum(v.each) + len(v.within) for v in variants)
+        most = max(sum(v.each) + len(v.within) for v in variants)
         rows = np.zeros((len(variants), 1 + most, k))
+        floor = np.zeros(rows.shape[:2])
         asked = np.zeros(rows.shape[:2], dtype=bool)
-        for v, mine, mine_asked in zip(variants, rows, asked, strict=True):
-            if v.positive is None:
-                continue
+        for i, v in enumerate(variants):
             own, alone = len(v.columns), np.flatnonzero(v.each)
-            mine[0, :own] = v.positive
-            mine[1 + np.arange(len(alone)), alone] = 1.0
-            mine[1 + len(alone) : 1 + len(alone) + len(v.within), :own] = v.within
-            mine_asked[: 1 + len(alone) + len(v.within)] = True
-        return cls(rows, np.array([v.least for v in variants]), asked)
+            if v.positive is not None:
+                rows[i, 0, :own], floor[i, 0], asked[i, 0] = v.positive, v.least, True
+            rows[i, 1 + np.arange(len(alone)), alone] = 1.0
+            sums = slice(1 + len(alone), 1 + len(alone) + len(v.within))
+            rows[i, sums, :own], floor[i, sums] = v.within, v.floor
+            asked[i, 1 : sums.stop] = True
+        return cls(rows, floor, asked)
 
     @classmethod
     def joined(cls, parts: Sequence[Limits]) -> Limits:
         """The variants of all parts, one after the other."""
         return cls(
             padded([part.rows for part in parts]),
-            np.concatenate([part.least for part in parts]),
+            padded([part.floor for part in parts]),
             padded([part.asked for part in parts]),
         )
 
@@ -76,19 +76,19 @@ def padded(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Array) -> Array:
     """(n,) for variants which (n,): sums (n, m), what `rows w` is at the mean of the coefficients,
-    of covariance `roots roots'`, roots (n, m, r); before (n,): standard deviation of the first sum
-    in the prior."""
+    of covariance `roots roots'`, roots (n, m, r); before (n, m): standard deviations of the sums in
+    the prior."""
     from scipy.special import log_ndtr
 
-    asked, centre = limits.asked[which], sums.copy()
-    centre[:, 0] -= limits.least[which]
+    asked, centre = limits.asked[which], sums - limits.floor[which]
     variance = np.where(asked, np.einsum("nmr,nmr->nm", roots, roots) + _TINY, 1.0)
     z = centre / np.sqrt(variance)
-    share = log_ndtr(-limits.least[which] / (before + _TINY))
+    shares = log_shares(limits, which, before)
+    share = shares[:, 0]
     out = np.where(asked[:, 0], log_ndtr(z[:, 0]) - share, 0.0)
     wrong = (z[:, 1:] < 0) & asked[:, 1:]  # the right side of a limit costs nothing
     alone = np.zeros(wrong.shape)
-    alone[wrong] = log_ndtr(z[:, 1:][wrong]) - np.log(0.5)
+    alone[wrong] = log_ndtr(z[:, 1:][wrong]) - shares[:, 1:][wrong]
     out += alone.sum(axis=1)
     far = np.flatnonzero((wrong.any(axis=1) | (z[:, 0] < 0)) & asked[:, 0])
     if far.size and wrong.shape[1]:
@@ -100,33 +100,50 @@ def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Arr
     return np.asarray(out)
 
 
-def log_odds_together(limits: Limits, which: Ints, sums: Array, roots: Array) -> Array:
+def log_odds_together(
+    limits: Limits, which: Ints, before: Array, sums: Array, roots: Array
+) -> Array:
     """(n,) what the same can't exceed by all limits at once; inf where it is not worth a look: one
     that is wrong may be set right by others that are then far off."""
     from scipy.special import log_ndtr
 
-    asked, centre = limits.asked[which], sums.copy()
-    centre[:, 0] -= limits.least[which]
+    asked, centre = limits.asked[which], sums - limits.floor[which]
     size = np.where(asked, np.linalg.norm(roots, axis=2) + _TINY, 1.0)
     z, unit = centre / size, roots / size[:, :, None]
     out = np.full(len(z), np.inf)
-    many = asked.sum(axis=1)
-    some = np.flatnonzero(np.any((z < 0) & asked, axis=1) & (many > 1))
+    some = np.flatnonzero(np.any((z < 0) & asked, axis=1) & (asked.sum(axis=1) > 1))
     if some.size:
         far = _distances(np.where(asked[some], z[some], np.inf), unit[some])
-        out[some] = log_ndtr(-far) + many[some] * _LOG_2
+        out[some] = log_ndtr(-far) - log_shares(limits, which[some], before[some]).sum(axis=1)
     return out
 
 
-def all_kept(limits: Sequence[tuple[Array, Array]]) -> float:
-    """log of the largest share that several limits may have together, over the least that they had
-    in the prior, where all were independent: sums (m,) to be positive, and their roots (m, r)."""
+def log_shares(limits: Limits, which: Ints, before: Array) -> Array:
+    """(n, m) log of the share of the prior that keeps each limit; 0 where none is asked."""
     from scipy.special import log_ndtr
 
-    sums, roots = (np.concatenate(each) for each in zip(*limits, strict=True))
+    share = log_ndtr(-limits.floor[which] / (before + _TINY))
+    return np.where(limits.asked[which], share, 0.0)
+
+
+class Kept(NamedTuple):
+    """Limits (m,) of one part: sums, by how much each is kept at the mean; roots (m, r) of their
+    covariance; log_shares of the prior that keep them."""
+
+    sums: Array
+    roots: Array
+    log_shares: Array
+
+
+def all_kept(limits: Sequence[Kept]) -> float:
+    """log of the largest share that several parts' limits may have together, over the least that
+    they had in the prior, where all were independent."""
+    from scipy.special import log_ndtr
+
+    sums, roots, shares = (np.concatenate(each) for each in zip(*limits, strict=True))
     size = np.linalg.norm(roots, axis=1) + _TINY
     far = distance(sums / size, roots / size[:, None])
-    return float(log_ndtr(-far)) + len(sums) * _LOG_2
+    return float(log_ndtr(-far) - shares.sum())
 
 
 def distance(z: Array, unit: Array) -> float:

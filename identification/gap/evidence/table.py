@@ -127,7 +127,7 @@ class EvidenceTable:
         """Levels, variants with limits, and scales that are so near to the best of their word, but
         for what is done (l, v, s)."""
         floor = self._of_word() - nats
-        some = np.flatnonzero(self._limits.asked[:, 0] & (self._best > floor))
+        some = np.flatnonzero(self._limits.asked.any(axis=1) & (self._best > floor))
         todo = (self.logs[:, some] > floor[some, None]) & ~done[:, some]
         level, place, scale = np.nonzero(todo)
         return level, some[place], scale
@@ -185,12 +185,12 @@ class EvidenceTable:
         new = np.append(True, (np.diff(level) != 0) | (np.diff(which) != 0))
         place = np.cumsum(new) - 1  # scales of one variant at one level share the rest
         rows = self._limits.rows[which[new]] @ self._root[which[new]]  # (u, m, k), of unit
-        before = np.linalg.norm(rows[:, 0], axis=1)[place] * self.scales[which, scale]
+        before = np.linalg.norm(rows, axis=2)[place] * self.scales[which, scale][:, None]
         rows = (rows @ self._vectors[level[new], which[new]])[place]  # and along the eigenvectors
         sums = np.einsum("wmk,wk->wm", rows, self._mean[level, which, scale])
         rows *= np.sqrt(self._variance[level, which, scale])[:, None]
         odds = log_odds(self._limits, which, before, sums, rows)
         if not closely:
             return odds
-        most = log_odds_together(self._limits, which, sums, rows)
+        most = log_odds_together(self._limits, which, before, sums, rows)
         return np.minimum(most - odds, 0.0)

@@ -27,6 +27,12 @@ def above(torque: Array, weight: Array, bend: float) -> Array:
     return np.asarray(np.maximum(torque + weight - bend, 0.0) - np.maximum(weight - bend, 0.0))
 
 
+def slopes(bends: int) -> Array:
+    """(bends + 1, bends + 1) what a line and hinges, these in order, have for slopes up to each of
+    the hinges and beyond the last."""
+    return np.tril(np.ones((bends + 1, bends + 1)))
+
+
 def from_level_to_level(places: Array) -> Array:
     """Root of the prior of a line and hinges between places (k + 1,), so that the curve at these
     is as rough as the imperfection of laws is (`evidence.alike`), none at the first of them."""

@@ -27,8 +27,8 @@ class Variant:
     """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
     `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
     coefficients that physics wants above `least` (None: either sign). each (k,): coefficients that
-    may not be negative either. within (m, k): weights of further sums above zero. cost: nats less
-    of evidence, for what its columns took from the data themselves. info: the facts
+    may not be negative either. within (m, k): weights of further sums that are above floor (m,).
+    cost: nats less of evidence, for what its columns took from the data themselves. info: the facts
     of its law, by names that its own effect gives them and reports from; what others may ask of a
     variant are the properties below.
     """
@@ -42,6 +42,7 @@ class Variant:
     least: float = 0.0
     each: tuple[bool, ...] = ()
     within: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    floor: Array = field(default_factory=lambda: np.zeros(0))
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
     cost: float = 0.0
@@ -189,6 +190,7 @@ class Variant:
             self.least,
             self.each,
             self.within.tobytes(),
+            self.floor.tobytes(),
             self.other_springs,
             self.slips_on,
             self.cost,
@@ -207,6 +209,7 @@ def variant(
     least: float = 0.0,
     each: bool | tuple[bool, ...] = False,
     within: Array | None = None,
+    floor: float | Array = 0.0,
     cost: float = 0.0,
     **info: Any,
 ) -> Variant:
@@ -223,6 +226,7 @@ def variant(
         least,
         _all(each, k),
         np.zeros((0, k)) if within is None else within,
+        np.broadcast_to(floor, 0 if within is None else len(within)),
         info,
         prior,
         cost,
