@@ -77,7 +77,8 @@ def strength(bench: Bench, v: Variant, columns: Array, times: float) -> Array:
     limits, first = Limits.of([v]), np.eye(len(unit))[0]
     apart = np.where(first > 0, 1.0, 0.4 * (-1.0) ** np.arange(len(unit)))  # where a play rests
     ways = [v.root @ u for u in (unit, apart, first)]
-    w = next(w for w in ways if limits is None or np.all(limits.rows[0] @ w >= 0))
+    signs = limits.rows[0][limits.floor[0] >= 0]  # how far a curve may go says nothing of its way
+    w = next(w for w in ways if np.all(signs @ w >= 0))
     moved = columns[:, list(v.columns)] @ w
     u = moved[: bench.rows.n]
     size = np.sqrt(np.mean((u - u.mean()) ** 2)) or np.sqrt(np.mean(u**2))
