@@ -12,7 +12,8 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint, troubles_named
-from identification.gap.judging.strain import what_is_strained
+from identification.gap.judging.broken import broken
+from identification.gap.judging.strain import LIMIT, what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY, SWINGS
 from identification.gap.recording.snaps import Snaps
@@ -209,10 +210,21 @@ _MISSED, _OF_WAY = 5.0, 0.05  # times the noise; of the way that the joint turns
 
 
 def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
-    """Why an arm's best explanation was not believed, where that is what it asks for: META may
-    state too little, and only its author can tell."""
+    """Why the best explanation was not believed, where that is what it does, or what an arm's asks
+    for: META may state too little, and only its author can tell."""
     best, swings = found.explanations[0], found.engine.bench.noise.swings
-    if verdict != "unknown" or not found.engine.bench.data.arm:
+    if verdict != "unknown":
+        return ()
+    fitted = fit(found.engine, best, alike=True)
+    words = " and ".join(best.troubles)
+    off, word = broken(found.engine, fitted)
+    if off > LIMIT:
+        text = (
+            f"What explains the gap best ({words}) takes a {word} that lies {off:.0f} standard "
+            "deviations outside what that word allows: it was not believed."
+        )
+        return (Note(REMARK, text),)
+    if not found.engine.bench.data.arm:
         return ()
     if not best.parts and swings > SWINGS:
         text = (
@@ -220,10 +232,9 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
             "of one sample: a vibration, or a pick-up of the mains. Find it before you go on."
         )
         return (Note(FAULT, text),)
-    asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
+    asks = what_is_strained(found.engine, fitted, best.eta)
     if not asks:
         return ()
-    words = " and ".join(best.troubles)
     what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"
     text = (
         f"{what} asks for {asks}: it was not believed. "

@@ -34,7 +34,9 @@ FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
 BENCH_SLACKS = (0.0007, 0.002, 0.006, 0.02)  # under which what hangs loose comes to bear
 BENCH_SHARES = (0.01, 0.03, 0.1)
-STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45)  # of it, between which several faces seat
+# At low force: a gap of an arm's fixture that closes at nearly half of the load is a knee.
+LATEST = 0.35
+STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, LATEST)  # of it, between which several faces seat
 RUBS = (0.02, 0.05)  # of it: friction that holds them there and back
 HERTZ_AT = 0.1  # of the largest force: where its scale is put
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
@@ -81,6 +83,8 @@ def variants(bench: Bench) -> list[Variant]:
     forces = FORCES if bench.data.arm else BENCH_FORCES
     for share in forces:
         for law in (*SEATED, *(BESIDES if bench.data.arm else ())):
+            if law == "slack" and share > LATEST:
+                continue
             out.append(_seated(bench, law, share * top, scales))
             if law == "exponential":
                 columns += out[-1].columns
@@ -324,6 +328,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     law, force = found.info["laws"][0]
     wide = force * (1 + close * FINER)
     if not bench.imposed:
+        latest = LATEST * float(np.abs(bench.load).max())
+        wide = wide[wide <= latest] if bench.data.arm else wide
         return [_seated(bench, law, f, found.scales, 1 / len(FINER)) for f in wide.tolist()]
     most = _WIDEST if law == "toe" else 1.0
     wide = wide[wide < most * _stroke(bench)].tolist()

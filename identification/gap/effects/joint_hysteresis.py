@@ -234,12 +234,11 @@ def _spectra(
     laws = [("Iwan", radius, slips - torque[:, None])]
     if bench.data.arm:
         laws.append(("Prandtl", radius[:-1], slips[:, :-1]))
-    reach = 2.0 if path.worked_in else 1.0  # what was cycled before goes all the way back first
     out = []
     for law, radii, states in laws:
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
         label = f"{name} spectrum{THAT_SLIPS if law == 'Prandtl' else ''}"
-        within = friction_law.no_knee(bench, torque, reach * radii)
+        within = friction_law.no_knee(bench, torque, radii, path)
         out.append(spectrum(label, joint, columns, radii, law, within=within))
     return out
 

@@ -153,7 +153,7 @@ def signs_kept(level: NoiseLevel, parts: tuple[Part, ...]) -> float:
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
-        limits = _limits(level.engine, p.variant)
+        limits = limits_of(level.engine, p.variant)
         which = limits.asked[0]
         if which.any():
             rows = limits.rows
@@ -168,7 +168,7 @@ def signs_kept(level: NoiseLevel, parts: tuple[Part, ...]) -> float:
 _ONE = np.zeros(1, dtype=np.intp)
 
 
-def _limits(engine: Engine, v: Variant) -> Limits:
+def limits_of(engine: Engine, v: Variant) -> Limits:
     """Of one variant; the same few come again in many explanations. Kept with the engine: a cache
     of the module would keep the benches of many diagnoses alive."""
     if v not in engine.limits:

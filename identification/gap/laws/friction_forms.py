@@ -101,7 +101,9 @@ def saturating(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]
         radius = radius[radius < float(np.abs(reached).max())]  # beyond, nothing moves
         columns = [bench.add_joint(joint, unit * state) for state in through.plays(radius).T]
         label, prior = f"{name} spectrum saturating at {share:g}", 0.25 / len(SATURATES)
-        out.append(spectrum(label, joint, columns, radius, "Prandtl", prior=prior, saturates=most))
+        facts: dict[str, Any] = {"saturates": most, "prior": prior}
+        facts["within"] = friction_law.no_knee(bench, torque, radius, path, most)
+        out.append(spectrum(label, joint, columns, radius, "Prandtl", **facts))
     return out
 
 

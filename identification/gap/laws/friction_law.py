@@ -20,7 +20,7 @@ from identification.gap.laws.law import (
     fresh_after,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.path import with_loads, worked_in
+from identification.gap.model.path import Path, with_loads, worked_in
 from identification.gap.model.variants import LASTING, SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
@@ -138,16 +138,30 @@ def saturating(load: Array, most: float) -> Array:
 _NONE = 0.05  # of the range: loads below that are as good as none
 
 
-def no_knee(bench: Bench, torque: Array, slips: Array) -> Array | None:
-    """(1, k): that what slips at torques (k,) has slipped by a good part where the force is first
-    half of its largest, of what it has at the largest torque (n,). Friction acts from the first
-    load on; what holds half the load and then gives way has yielded. Of a specimen that is loaded
-    from one side: to and fro, strokes far beyond the first slip show friction of one strength."""
-    if bench.data.arm or not bench.course.one_sided:
+def no_knee(
+    bench: Bench, torque: Array, radius: Array, path: Path, saturates: float | None = None
+) -> Array | None:
+    """(1, k): that what slips at strengths radius (k,) has slipped by a good part where the load is
+    first half of its largest, of what it has at the largest torque (n,). Friction acts from the
+    first load on; what holds half the load and then gives way has yielded. Of a specimen only where
+    that is loaded from one side: to and fro, strokes far beyond the first slip show friction of one
+    strength. path: what was cycled before goes all the way back first, and what hangs on weights
+    has slipped by these. saturates: of a load that does, most of what comes through, Nm."""
+    size, top = np.abs(torque), int(np.abs(torque).argmax())
+    if bench.data.arm:
+        half = 0.5 * float(size[top])
+    elif bench.course.one_sided:
+        force = np.abs(bench.rows.measured_force)
+        half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
+    else:
         return None
-    size, force = np.abs(torque), np.abs(bench.rows.measured_force)
-    half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
-    early, late = (np.maximum(top - slips, 0.0) for top in (half, float(size.max())))
+    slips = (2.0 if path.worked_in else 1.0) * radius
+    if path.weight is not None:
+        hung = float(np.sign(torque[top]) * path.at_rows(path.weight)[top])
+        slips = np.maximum(radius - np.clip(hung, -radius, radius), 0.0)
+    loads = np.array([[half], [size[top]]])
+    loads = loads if saturates is None else saturating(loads, saturates)
+    early, late = np.maximum(loads - slips, 0.0)
     return np.asarray(early - _AT_HALF * late)[None, :] / max(float(late.max()), _TINY)
 
 
