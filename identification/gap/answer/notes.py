@@ -215,9 +215,8 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
     best, swings = found.explanations[0], found.engine.bench.noise.swings
     if verdict != "unknown":
         return ()
-    fitted = fit(found.engine, best, alike=True)
     words = " and ".join(best.troubles)
-    off, word = broken(found.engine, fitted)
+    off, word = broken(found.engine, best)
     if off > LIMIT:
         text = (
             f"What explains the gap best ({words}) takes a {word} that lies {off:.0f} standard "
@@ -232,7 +231,7 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
             "of one sample: a vibration, or a pick-up of the mains. Find it before you go on."
         )
         return (Note(FAULT, text),)
-    asks = what_is_strained(found.engine, fitted, best.eta)
+    asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
     if not asks:
         return ()
     what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"

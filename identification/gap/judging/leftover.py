@@ -109,7 +109,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     imperfection allow where these are far beyond: another channel, which the rows of the response
     do not show, asks for them."""
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
-    fitted = fit(engine, explanation, alike=True)
+    fitted = fit(engine, explanation)
     share = kept_within(max(_left(engine, fitted), readings_left(engine, fitted)), allowed)
     if goes_as_no_drift(engine, fitted):
         share *= NO_DRIFT
@@ -117,7 +117,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     hands = engine.bench.rows.rms(open_to_hands(engine, fitted))
     if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
         good = min(good, explanation.log_good)
-    asked = max(strain(engine, fitted, explanation.eta), broken(engine, fitted)[0])
+    asked = max(strain(engine, fitted, explanation.eta), broken(engine, explanation)[0])
     off = most_off(engine, fitted)
     return _unstrained(replace(explanation, log_good=good, off=off), asked)
 
@@ -183,8 +183,7 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     course = engine.bench.course
     if explanation.parts[0].word == _WANDERING[course.wanders]:
         return _less_likely(explanation, COMES_BACK)
-    fitted = fit(engine, explanation, alike=True)
-    left = _left(engine, fitted)
+    left = _left(engine, fit(engine, explanation))
     if course.only_a_curve and explanation.words <= CURVES:
         left = 0.0  # a curve as well: no reading of such a table stands off the next ones
     share = kept_within(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
@@ -199,4 +198,4 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    return _unstrained(replace(explanation, log_good=good), broken(engine, fitted)[0])
+    return _unstrained(replace(explanation, log_good=good), broken(engine, explanation)[0])

@@ -34,6 +34,7 @@ LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
 _AT_HALF = 0.18  # a spectrum as strong everywhere slips a quarter
+_AT_ONCE = 0.05  # of the largest load
 _TURNED = 0.01  # of the largest product of both
 _HARDLY = 0.2  # of the largest load: what slips beyond the rest of it shows less
 _TINY = 1e-300
@@ -143,10 +144,11 @@ def no_knee(
 ) -> Array | None:
     """(1, k): that what slips at strengths radius (k,) has slipped by a good part where the load is
     first half of its largest, of what it has at the largest torque (n,). Friction acts from the
-    first load on; what holds half the load and then gives way has yielded. Of a specimen only where
-    that is loaded from one side: to and fro, strokes far beyond the first slip show friction of one
-    strength. path: what was cycled before goes all the way back first, and what hangs on weights
-    has slipped by these. saturates: of a load that does, most of what comes through, Nm."""
+    first load on; what holds half the load and then gives way has yielded. What slips at once does
+    not count, as springs do that too. Of a specimen only where that is loaded from one side: to and
+    fro, strokes far beyond the first slip show friction of one strength. path: what was cycled
+    before goes all the way back first, and what hangs on weights has slipped by these. saturates:
+    of a load that does, most of what comes through, Nm."""
     size, top = np.abs(torque), int(np.abs(torque).argmax())
     if bench.data.arm:
         half = 0.5 * float(size[top])
@@ -161,7 +163,7 @@ def no_knee(
         slips = np.maximum(radius - np.clip(hung, -radius, radius), 0.0)
     loads = np.array([[half], [size[top]]])
     loads = loads if saturates is None else saturating(loads, saturates)
-    early, late = np.maximum(loads - slips, 0.0)
+    early, late = np.maximum(loads - slips, 0.0) * (slips > _AT_ONCE * loads[1])
     return np.asarray(early - _AT_HALF * late)[None, :] / max(float(late.max()), _TINY)
 
 
