@@ -152,6 +152,14 @@ def test_what_goes_back_under_a_standing_load_does_not_creep(back: float, drifts
     assert not library(make_bench(few), ["thermal_drift"])
 
 
+@pytest.mark.parametrize(("sign", "word"), [(1.0, "joint_creep"), (-1.0, "thermal_drift")])
+def test_what_goes_against_a_standing_load_does_not_creep(sign: float, word: str) -> None:
+    """A film dries while it is pulled."""
+    at = np.linspace(0.0, 1.0, 600)
+    noise = 1e-6 * np.random.default_rng(4).standard_normal(600)
+    assert explained(under_a_weight(sign * 4e-5 * (1 - np.exp(-3 * at)) + noise)).verdict == word
+
+
 @pytest.mark.parametrize(("every_s", "verdict"), [(10.0, "unknown"), (120.0, "thermal_drift")])
 def test_a_room_may_swing_often_but_slowly(every_s: float, verdict: str) -> None:
     """Fourteen times in 1.7 h, or in 20 h."""

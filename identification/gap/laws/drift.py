@@ -57,15 +57,17 @@ def own_clock(bench: Bench) -> bool:
 
     It can where the load comes and goes at least three times, in runs or in cycles of one; where
     something moves before anything is loaded; or where what the spring does not explain goes back
-    while the load waits. A weight that hangs all the time creeps, unless what is read goes back.
+    while the load waits. A weight that hangs all the time creeps, unless what is read goes back, or
+    against the weight.
     """
-    if hangs(bench) and not _goes_back(bench.response):
+    if hangs(bench) and not (_goes_back(bench.response) or _against_it(bench)):
         return False
     if bench.course.passes >= 3:
         return True
     # a screw that relaxes, and is put right, takes the springs to and fro
     alone = bench.response - bench.slope * bench.load
-    return _goes_back(alone[waited(bench)]) or _goes(alone[_before(bench)], bench.noise.stated)
+    went = _way(alone[_before(bench)], bench.noise.stated) != 0
+    return went or _goes_back(alone[waited(bench)])
 
 
 def _before(bench: Bench) -> Flags:
@@ -73,15 +75,21 @@ def _before(bench: Bench) -> Flags:
     return np.asarray(np.cumsum(~bench.rows.zero | bench.rows.continuous) == 0)
 
 
-def _goes(read: Array, stated: float) -> bool:
-    """Whether what is read (n,) is elsewhere in its last third than in its first, beyond what it
-    scatters, and what is stated of one reading."""
+def _against_it(bench: Bench) -> bool:
+    """Whether what is read under a standing load goes against it, as nothing does that creeps."""
+    sign = float(np.sign(bench.load.mean())) * bench.sense
+    return _way(bench.response, bench.noise.stated) * sign < 0
+
+
+def _way(read: Array, stated: float) -> float:
+    """By how much what is read (n,) is elsewhere in its last third than in its first; 0 where that
+    is not beyond what it scatters, and what is stated of one reading."""
     third = len(read) // 3
     if third < _OF_EACH:
-        return False
-    way = abs(float(read[-third:].mean() - read[:third].mean()))
+        return 0.0
+    way = float(read[-third:].mean() - read[:third].mean())
     noise = max(white_sd(np.diff(read, 2)), stated) * (2 / third) ** 0.5
-    return bool(way > max(_CLEARLY * noise, stated))
+    return way if abs(way) > max(_CLEARLY * noise, stated) else 0.0
 
 
 def waited(bench: Bench) -> Flags:
