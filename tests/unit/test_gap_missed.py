@@ -12,7 +12,8 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.judging import leftover
-from identification.gap.judging.leftover import _still_good, readings_left
+from identification.gap.judging.leftover import _still_good
+from identification.gap.judging.remains import readings_left
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from tests.unit.small_explanations import part, said

@@ -215,8 +215,8 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
     best, swings = found.explanations[0], found.engine.bench.noise.swings
     if verdict != "unknown":
         return ()
-    words = " and ".join(best.troubles)
-    off, word = broken(found.engine, best)
+    words, fitted = " and ".join(best.troubles), fit(found.engine, best)
+    off, word = broken(found.engine, best, fitted)
     if off > LIMIT:
         text = (
             f"What explains the gap best ({words}) takes a {word} that lies {off:.0f} standard "
@@ -231,7 +231,7 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
             "of one sample: a vibration, or a pick-up of the mains. Find it before you go on."
         )
         return (Note(FAULT, text),)
-    asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
+    asks = what_is_strained(found.engine, fitted, best.eta)
     if not asks:
         return ()
     what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"

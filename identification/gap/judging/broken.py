@@ -21,21 +21,24 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, limits_of
 from identification.gap.evidence.signs import distance
 from identification.gap.explanations.explanation import Explanation
-from identification.gap.explanations.fit import fit
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.judging.remains import response_left
 
 # How well shapes meet a mechanism at best, of what it does: of arms, and of rigs that nobody built
 # to be measured; and of the largest coefficient of a part, of these.
 _MET, _MET_OF_A_BENCH, _EACH = 0.02, 0.04, 0.02
 
 
-def broken(engine: Engine, explanation: Explanation) -> tuple[float, str]:
+def broken(engine: Engine, explanation: Explanation, fitted: Fit) -> tuple[float, str]:
     """Mahalanobis distance of a part's coefficients from where all its limits are kept, standard
     deviations, of the part that is farthest off, and its word; 0 and no word where all are kept.
-    Laws count as no better met than they are: thousands of readings tell more than they mean."""
+    Laws count as no better met than they are, by what the fit leaves too: thousands of readings
+    tell more than they mean, and what one law lacks others make up for."""
     met = _MET if engine.bench.data.arm else _MET_OF_A_BENCH
-    eta = max(explanation.eta, met * max(explanation.sizes, default=0.0))
-    fitted = fit(engine, replace(explanation, eta=eta), alike=True)
-    each = [(_off(engine, part, *fitted.of(i)), part.word) for i, part in enumerate(fitted.parts)]
+    met *= max(explanation.sizes, default=0.0)
+    eta = max(explanation.eta, met, response_left(engine, fitted))
+    looser = fit(engine, replace(explanation, eta=eta), alike=True)
+    each = [(_off(engine, part, *looser.of(i)), part.word) for i, part in enumerate(looser.parts)]
     most = max(each, default=(0.0, ""))
     return most if most[0] > 0 else (0.0, "")
 

@@ -21,7 +21,7 @@ from identification.gap.explanations.explanation import (
     kept_within,
     may_remain,
 )
-from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.fit import fit
 from identification.gap.explanations.verdict import (
     ARM_AS_STATED,
     AS_STATED,
@@ -33,6 +33,7 @@ from identification.gap.judging.broken import broken
 from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.paths import goes_as_no_drift
+from identification.gap.judging.remains import readings_left, response_left
 from identification.gap.judging.stated import led_by_springs
 from identification.gap.judging.strain import LIMIT, most_off, strain
 from identification.gap.model.noise import UNSURE
@@ -72,7 +73,7 @@ def looked_up(found: SearchResult) -> SearchResult:
             continue
         asked = max(strain(engine, fitted, none.eta), off * LIMIT / ARM_AS_STATED)
         done[none.words] = _unstrained(none, asked)
-        clean = _left(engine, fitted) < engine.bench.noise.stated
+        clean = response_left(engine, fitted) < engine.bench.noise.stated
         if clean and off < AS_STATED:
             for_nothing = [e for e in done.values() if e.parts and e.words <= STATED]
             done |= {e.words: _less_likely(e, FOR_NOTHING) for e in for_nothing}
@@ -110,14 +111,14 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     do not show, asks for them."""
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
     fitted = fit(engine, explanation)
-    share = kept_within(max(_left(engine, fitted), readings_left(engine, fitted)), allowed)
+    share = kept_within(max(response_left(engine, fitted), readings_left(engine, fitted)), allowed)
     if goes_as_no_drift(engine, fitted):
         share *= NO_DRIFT
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
     hands = engine.bench.rows.rms(open_to_hands(engine, fitted))
     if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
         good = min(good, explanation.log_good)
-    asked = max(strain(engine, fitted, explanation.eta), broken(engine, explanation)[0])
+    asked = max(strain(engine, fitted, explanation.eta), broken(engine, explanation, fitted)[0])
     off = most_off(engine, fitted)
     return _unstrained(replace(explanation, log_good=good, off=off), asked)
 
@@ -141,34 +142,6 @@ FOR_NOTHING = 10.0
 STATED = LINEAR - {"force_scale", "displacement_scale"}
 
 
-def _left(engine: Engine, fitted: Fit) -> float:
-    """rms (m) of rows beyond their noise; what runs are off by together, the fit has taken."""
-    bench, n = engine.bench, engine.bench.rows.n
-    weight, noise = bench.rows.weight / bench.rows.weight.sum(), bench.noise
-    left = engine.target[:n] - fitted.response
-    known = noise.response**2 + noise.hold**2 + open_to_hands(engine, fitted) ** 2
-    square = weight @ (left**2 - known)
-    return float(np.sqrt(max(float(square), 0.0)))
-
-
-PLAINLY = 3.0  # times the noise of the readings, which is known to a fifth
-
-
-def readings_left(engine: Engine, fitted: Fit) -> float:
-    """rms (m) by which the target would be elsewhere, plainly beyond noise, were the joints where
-    they were read and not where a fit has them; 0 without readings. However well it meets the
-    displacement: what a joint was seen to do, no mounting did."""
-    bench, rows = engine.bench, engine.bench.rows
-    if not bench.has_q:
-        return 0.0
-    missed, noise = fitted.missed_readings(engine)
-    lever = bench.lever[rows.edges].T  # (m, holds)
-    moved = np.sum(lever * missed, axis=0)
-    weight = rows.hold_weight[rows.edges] / rows.hold_weight[rows.edges].sum()
-    square = weight @ (moved**2 - np.sum((lever * PLAINLY * noise) ** 2, axis=0))
-    return float(np.sqrt(max(float(square), 0.0)))
-
-
 def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int = 1) -> float:
     """What an explanation may leave, m. unseen: what noise hides."""
     remainder = may_remain(engine, explanation.troubles)
@@ -183,7 +156,8 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     course = engine.bench.course
     if explanation.parts[0].word == _WANDERING[course.wanders]:
         return _less_likely(explanation, COMES_BACK)
-    left = _left(engine, fit(engine, explanation))
+    fitted = fit(engine, explanation)
+    left = response_left(engine, fitted)
     if course.only_a_curve and explanation.words <= CURVES:
         left = 0.0  # a curve as well: no reading of such a table stands off the next ones
     share = kept_within(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
@@ -198,4 +172,4 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    return _unstrained(replace(explanation, log_good=good), broken(engine, explanation)[0])
+    return _unstrained(replace(explanation, log_good=good), broken(engine, explanation, fitted)[0])
