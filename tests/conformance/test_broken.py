@@ -12,6 +12,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.judging import broken as judging
 from identification.gap.judging.broken import broken
 from identification.gap.model.variants import Variant
 from tests.conformance.effect_benches import of, quick_engine
@@ -25,45 +26,73 @@ def frictions() -> tuple[Engine, Variant]:
     return quick_engine(bench), next(v for v in variants if v.form == "spectrum" and v.each)
 
 
-def found(engine: Engine, v: Variant, w: Array, sd: float = 1e-3) -> Fit:
-    """A fit with coefficients w that are known to sd each."""
-    one = fit(engine, Explanation((Part(v, 0.1),), 0.0, 0.0, (0.0,), 0.0))
-    return replace(one, coefficients=w, covariance=sd**2 * np.eye(len(w)))
+def off(engine: Engine, v: Variant, w: Array, monkeypatch: pytest.MonkeyPatch, sd: float) -> float:
+    """How far friction of strengths w is off that are known to sd each, its laws being exact."""
+    one = Explanation((Part(v, 0.1),), 0.0, 0.0, (0.0,), 0.0)
+    known = replace(fit(engine, one), coefficients=w, covariance=sd**2 * np.eye(len(w)))
+    monkeypatch.setattr(judging, "fit", lambda *_, **__: known)
+    return broken(engine, one, known)[0]
 
 
-def test_what_keeps_its_limits_breaks_none() -> None:
+def test_what_keeps_its_limits_breaks_none(monkeypatch: pytest.MonkeyPatch) -> None:
     engine, v = frictions()
-    assert broken(engine, found(engine, v, np.full(len(v.columns), 0.1))) == (0.0, "")
-    nothing = fit(engine, Explanation((), 0.0, 0.0, (), 0.0))
-    assert broken(engine, nothing) == (0.0, "")
+    assert off(engine, v, np.full(len(v.columns), 0.1), monkeypatch, 1e-3) == 0.0
+    nothing = Explanation((), 0.0, 0.0, (), 0.0)
+    assert broken(engine, nothing, fit(engine, nothing)) == (0.0, "")
 
 
-def test_friction_that_pushes_is_as_far_off_as_it_does() -> None:
+def test_friction_that_pushes_is_as_far_off_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
     engine, v = frictions()
     w = np.full(len(v.columns), 0.1)
     w[0] = -6e-3
-    off, word = broken(engine, found(engine, v, w))
-    assert (off, word) == (pytest.approx(6.0 / 2**0.5), "joint_hysteresis")
-    assert broken(engine, found(engine, v, w, sd=1.0))[0] < 0.01  # nobody knows
-    w[0] = -6e-4  # and no law is met to a thousandth
-    assert broken(engine, found(engine, v, w, sd=1e-9))[0] == pytest.approx(0.6)
+    assert off(engine, v, w, monkeypatch, 1e-3) == pytest.approx(6.0)
+    assert off(engine, v, w, monkeypatch, 1.0) < 0.01  # nobody knows
 
 
-def test_many_limits_that_are_broken_a_little_count_together() -> None:
+def test_many_limits_that_are_broken_a_little_count_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     engine, v = frictions()
     w = np.full(len(v.columns), 0.1)
     w[:4] = -3e-3
-    assert broken(engine, found(engine, v, w))[0] == pytest.approx(6.0 / 2**0.5)  # by 3 each
+    assert off(engine, v, w, monkeypatch, 1e-3) == pytest.approx(6.0)  # 3 times the root of four
 
 
-def test_of_several_parts_the_one_that_is_farthest_off_counts() -> None:
+def test_of_several_parts_the_one_that_is_farthest_off_counts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     engine, v = frictions()
-    w = np.full(len(v.columns), 0.1)
-    two = fit(engine, Explanation((Part(v, 0.1),) * 2, 0.0, 0.0, (0.0,) * 2, 0.0))
-    both = np.concatenate([w, w])
-    both[len(w)] = -7e-3
-    fitted = replace(two, coefficients=both, covariance=1e-6 * np.eye(len(both)))
-    assert broken(engine, fitted)[0] == pytest.approx(7.0 / 2**0.5)
+    two = Explanation((Part(v, 0.1),) * 2, 0.0, 0.0, (0.0,) * 2, 0.0)
+    w = np.full(2 * len(v.columns), 0.1)
+    w[0], w[len(v.columns)] = -2e-3, -7e-3
+    both = replace(fit(engine, two), coefficients=w, covariance=1e-6 * np.eye(len(w)))
+    monkeypatch.setattr(judging, "fit", lambda *_, **__: both)
+    most, word = broken(engine, two, both)
+    assert most == pytest.approx(7.0)
+    assert word == "joint_hysteresis"
+
+
+@pytest.mark.parametrize(
+    ("eta", "size", "left", "taken"),
+    [(0.0, 1e-3, 0.0, 2e-5), (0.0, 1e-3, 5e-5, 5e-5), (1e-4, 1e-3, 5e-5, 1e-4)],
+)
+def test_laws_count_as_no_better_met_than_they_are(
+    monkeypatch: pytest.MonkeyPatch, eta: float, size: float, left: float, taken: float
+) -> None:
+    """What an effect does is known to two hundredths of that, whatever readings there are, and to
+    what they leave."""
+    engine, v = frictions()
+    one = Explanation((Part(v, 0.1),), 0.0, eta, (size,), 0.0)
+    fitted, asked = fit(engine, one), []
+
+    def noted(_: Engine, explanation: Explanation, **__: bool) -> Fit:
+        asked.append(explanation.eta)
+        return fitted
+
+    monkeypatch.setattr(judging, "fit", noted)
+    monkeypatch.setattr(judging, "response_left", lambda *_: left)
+    broken(engine, one, fitted)
+    assert asked == [pytest.approx(taken)]
 
 
 @pytest.mark.slow
@@ -71,11 +100,9 @@ def test_of_several_parts_the_one_that_is_farthest_off_counts() -> None:
 def test_a_joint_that_yields_does_not_rub(withheld: bool) -> None:
     """At half of the load, and nothing before: friction of that one strength fits as well."""
     bench, variants, columns = of("joint_yield", "rich")
-    v = next(v for v in variants if v.joint == 3 and 0.45 < v.info["centre"] / v.info["top"] < 0.7)
-    data = with_effect(
-        "rich", v, columns[:, list(v.columns)] @ strength(bench, v, columns, 30.0), bench
-    )
-    explanation = explained(data, withhold=["joint_yield"] if withheld else [])
-    assert explanation.verdict == ("unknown" if withheld else "joint_yield")
-    told = [n for n in explanation.notes if "outside what that word allows" in n]
-    assert bool(told) is withheld
+    v = next(v for v in variants if v.label == "joint 1 lasting at 0.6 sharp")
+    w = strength(bench, v, columns, 30.0)
+    data = with_effect("rich", v, columns[:, list(v.columns)] @ w, bench)
+    found = explained(data, withhold=["joint_yield"] if withheld else [])
+    assert found.verdict == ("unknown" if withheld else "joint_yield")
+    assert any("outside what that word allows" in n for n in found.notes) is withheld

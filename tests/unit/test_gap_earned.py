@@ -28,7 +28,8 @@ from identification.gap.judging.heldout import (
     held_out,
     stated_prediction,
 )
-from identification.gap.judging.leftover import _left, looked_up
+from identification.gap.judging.leftover import looked_up
+from identification.gap.judging.remains import response_left
 from identification.gap.laws.drift import FreePath, free_path, free_variant
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
@@ -514,5 +515,5 @@ def test_what_is_left_beyond_the_noise_is_what_stands_off_in_every_run() -> None
         off = noise.response * row + (noise.hold * hold)[rows.edges][rows.hold]
         start.target = np.zeros(bench.layout.size)
         start.target[: rows.n] = stands_off + off + noise.run * run[rows.run]
-        squares.append(_left(start, fit(start, Explanation((), 0.0, 0.0, (), 0.0))) ** 2)
+        squares.append(response_left(start, fit(start, Explanation((), 0.0, 0.0, (), 0.0))) ** 2)
     assert np.mean(squares) ** 0.5 == pytest.approx(noise.stated, rel=0.15)

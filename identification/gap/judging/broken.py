@@ -26,7 +26,7 @@ from identification.gap.judging.remains import response_left
 
 # How well shapes meet a mechanism at best, of what it does: of arms, and of rigs that nobody built
 # to be measured; and of the largest coefficient of a part, of these.
-_MET, _MET_OF_A_BENCH, _EACH = 0.02, 0.04, 0.02
+_MET, _MET_OF_A_BENCH, _EACH = 0.02, 0.04, 0.05
 
 
 def broken(engine: Engine, explanation: Explanation, fitted: Fit) -> tuple[float, str]:
