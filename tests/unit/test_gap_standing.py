@@ -15,6 +15,7 @@ from identification.gap.model.history import sampling_time
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.recording.white import white_noise
 from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle
 
@@ -63,6 +64,24 @@ def test_an_understated_uncertainty_is_raised_to_what_the_samples_show() -> None
     force = 100 * triangle(3000, 3)
     data = running(force, force / SPRING + rng.normal(0, 5e-6, 3000), imposed="force")
     assert make_bench(data).noise.stated == pytest.approx(5e-6, rel=0.25)  # 1e-6 was stated
+
+
+@pytest.mark.parametrize(("times", "seen"), [(0.7, 1.0), (1.0, 1.0), (1.5, 1.5)])
+def test_holds_of_three_readings_tell_of_an_arm_what_is_more_than_stated(
+    times: float, seen: float
+) -> None:
+    """A scatter that META states too small had been a gap that no law explains."""
+    rng, data = np.random.default_rng(3), arm_data()
+    stated, three = data.instruments.displacement, np.arange(len(data.force)) % 4 < 3
+    per_row = {name: getattr(data, name)[three] for name in PER_ROW}
+    moved = 1.1e-5 * per_row["force"] + times * stated * rng.standard_normal(three.sum())
+    kept = replace(data, **per_row | {"displacement": moved}, q=None, tangential=None)
+    noise = make_bench(replace(kept, temperature=None)).noise
+    one = float(noise.response.max())  # of a first reading, which is a row of its own
+    assert one == pytest.approx(seen * stated, rel=0.12)
+
+
+PER_ROW = ("time", "session", "run", "setup", "repetition", "branch", "step", "force")
 
 
 @pytest.mark.parametrize(("times", "verdict"), [(1.0, "none"), (5.0, "none"), (9.0, "unknown")])

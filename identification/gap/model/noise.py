@@ -241,6 +241,9 @@ def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) ->
         least = 0.0 if data.arm else 0.33 * data.instruments.displacement
         return alone if measured is None else np.full(rows.n, max(measured, least))
     measured = _scatter(data, data.displacement, hold)
+    if measured is None and data.arm:  # short holds tell whether more than is stated
+        three = scatter_of_three(data.displacement, hold)
+        measured = three if three and three > data.instruments.displacement else None
     if measured is None:
         return alone
     # never less than a third of what is stated: second differences can't see everything
