@@ -26,50 +26,74 @@ def frictions() -> tuple[Engine, Variant]:
     return quick_engine(bench), next(v for v in variants if v.form == "spectrum" and v.each)
 
 
-def off(engine: Engine, v: Variant, w: Array, monkeypatch: pytest.MonkeyPatch, sd: float) -> float:
-    """How far friction of strengths w is off that are known to sd each, its laws being exact."""
+def off(engine: Engine, v: Variant, w: Array, monkeypatch: pytest.MonkeyPatch, sd: Array) -> float:
+    """How far friction of strengths w is off that are known to sd (k,), its laws being exact and
+    the gap next to none."""
     one = Explanation((Part(v, 0.1),), 0.0, 0.0, (0.0,), 0.0)
-    known = replace(fit(engine, one), coefficients=w, covariance=sd**2 * np.eye(len(w)))
+    plain = fit(engine, one)
+    joint = np.diag(np.append(np.zeros(len(plain.base)), sd**2))
+    known = replace(plain, coefficients=w, covariance=np.diag(sd**2), joint_covariance=joint)
     monkeypatch.setattr(judging, "fit", lambda *_, **__: known)
+    engine.structural = 1e-9
     return broken(engine, one, known)[0]
 
 
 def test_what_keeps_its_limits_breaks_none(monkeypatch: pytest.MonkeyPatch) -> None:
     engine, v = frictions()
-    assert off(engine, v, np.full(len(v.columns), 0.1), monkeypatch, 1e-3) == 0.0
+    k = len(v.columns)
+    assert off(engine, v, np.full(k, 0.1), monkeypatch, np.full(k, 1e-3)) == 0.0
     nothing = Explanation((), 0.0, 0.0, (), 0.0)
     assert broken(engine, nothing, fit(engine, nothing)) == (0.0, "")
 
 
 def test_friction_that_pushes_is_as_far_off_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
     engine, v = frictions()
-    w = np.full(len(v.columns), 0.1)
-    w[0] = -6e-3
-    assert off(engine, v, w, monkeypatch, 1e-3) == pytest.approx(6.0)
-    assert off(engine, v, w, monkeypatch, 1.0) < 0.01  # nobody knows
+    w, sd = np.full(len(v.columns), 0.1), np.full(len(v.columns), 1e-3)
+    w[0], sd[0] = -1.2e-2, 2e-3
+    assert off(engine, v, w, monkeypatch, sd) == pytest.approx(6.0 / 5.5)
+    assert off(engine, v, w, monkeypatch, 1e3 * sd) < 0.01  # nobody knows
 
 
 def test_many_limits_that_are_broken_a_little_count_together(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     engine, v = frictions()
-    w = np.full(len(v.columns), 0.1)
-    w[:4] = -3e-3
-    assert off(engine, v, w, monkeypatch, 1e-3) == pytest.approx(6.0)  # 3 times the root of four
+    w, sd = np.full(len(v.columns), 0.1), np.full(len(v.columns), 1e-3)
+    w[:4] = -3e-3  # 3 times the root of four
+    assert off(engine, v, w, monkeypatch, sd) == pytest.approx(6.0 / 5.5)
+
+
+def test_what_hardly_moves_the_target_breaks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However surely: by the share of the gap that is missed where the limit is kept."""
+    engine, v = frictions()
+    w, sd = np.full(len(v.columns), 0.1), np.full(len(v.columns), 1e-3)
+    w[3] = -0.05
+    assert off(engine, v, w, monkeypatch, sd) == pytest.approx(50.0 / 5.5)
+    moved = engine.bench.rows.rms(0.05 * engine.columns([v.columns[3]])[: engine.bench.rows.n, 0])
+    engine.structural = moved / 0.05
+    one = Explanation((Part(v, 0.1),), 0.0, 0.0, (0.0,), 0.0)
+    assert broken(engine, one, judging.fit(engine, one))[0] == pytest.approx(0.05 / 0.065)
+
+
+def test_all_else_follows_where_a_limit_is_kept() -> None:
+    """What the springs can do for a part of an effect is not missed."""
+    engine, v = frictions()
+    one = Explanation((Part(v, 0.1),), 0.0, 0.0, (0.0,), 0.0)
+    fitted = fit(engine, one)
+    by = 0.05 * np.eye(len(v.columns))[-1]  # what never slips is a spring
+    alone = engine.columns([v.columns[-1]])[: engine.bench.rows.n, 0] * 0.05
+    rows = engine.bench.rows
+    assert rows.rms(fitted.moved(engine, 0, by)) < 0.5 * rows.rms(alone)
 
 
 def test_of_several_parts_the_one_that_is_farthest_off_counts(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     engine, v = frictions()
-    two = Explanation((Part(v, 0.1),) * 2, 0.0, 0.0, (0.0,) * 2, 0.0)
-    w = np.full(2 * len(v.columns), 0.1)
-    w[0], w[len(v.columns)] = -2e-3, -7e-3
-    both = replace(fit(engine, two), coefficients=w, covariance=1e-6 * np.eye(len(w)))
-    monkeypatch.setattr(judging, "fit", lambda *_, **__: both)
-    most, word = broken(engine, two, both)
-    assert most == pytest.approx(7.0)
-    assert word == "joint_hysteresis"
+    monkeypatch.setattr(judging, "_off", lambda *a: (0.5, 1.5)[a[-1]])
+    other = replace(v, word="joint_yield")
+    two = Explanation((Part(v, 0.1), Part(other, 0.1)), 0.0, 0.0, (0.0,) * 2, 0.0)
+    assert broken(engine, two, fit(engine, two)) == (1.5, "joint_yield")
 
 
 @pytest.mark.parametrize(

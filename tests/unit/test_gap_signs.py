@@ -73,6 +73,7 @@ def sampled(mean: Array, covariance: Array, prior: Array, rows: Array, least: fl
 
 
 ALONE = np.array([[1.0]])
+TINY = (-1e-9, 1e-9)
 UNIT = np.ones((1, 1))  # how far sums went in the prior, where half of it keeps them anyway
 
 
@@ -82,7 +83,9 @@ def test_a_sum_may_be_below_zero_where_its_floor_is() -> None:
     floor, rows = np.array([-0.9]), np.array([[1.0, 1.0]])
     free = {"positive": False, "within": rows, "floor": floor}
     covariance = 0.02 * np.eye(2)  # of the sum 0.2^2
-    assert odds(np.array([-0.3, -0.3]), covariance, np.eye(2), **free) == 0.0
+    assert odds(np.array([0.3, 0.3]), covariance, np.eye(2), **free) == 0.0
+    either = [odds(np.array([d - 0.45, -0.45]), covariance, np.eye(2), **free) for d in TINY]
+    assert either[0] == pytest.approx(either[1], abs=1e-6)  # as much just above as just below
     found = odds(np.array([-1.0, -0.3]), covariance, np.eye(2), **free)
     assert found == pytest.approx(log_ndtr(-0.4 / 0.2) - log_ndtr(0.9 / 2**0.5))
 
@@ -108,6 +111,21 @@ def test_one_coefficient_may_not_pay_for_another_with_the_wrong_sign() -> None:
     free = odds(np.zeros(2), covariance, prior, least=0.15)
     assert free > -1.0  # the sum alone is easily met
     assert found < -15.0  # but not with both above zero: 0.15 / 5**0.5 is 6.7 standard deviations
+
+
+def test_a_floor_that_most_of_the_prior_keeps_is_dearer_to_break() -> None:
+    """Also of all limits together: two that data see as one sum, each far below its floor."""
+    covariance = np.eye(2) - (1 - 1e-4) * np.full((2, 2), 0.5)
+    found = []
+    for floor in (0.0, -2.0):
+        free = {"positive": False, "within": np.eye(2), "floor": floor}
+        v = variant("joint_yield", "v", [0, 1], (1.0,), **free)  # type: ignore[arg-type]
+        limits, which = Limits.of([v]), np.zeros(1, int)
+        sums = limits.rows @ np.full(2, floor - 0.1)
+        roots = limits.rows @ np.linalg.cholesky(covariance)
+        found.append(log_odds_together(limits, which, np.ones((1, 3)), sums, roots)[0])
+    half, most = 2 * np.log(0.5), 2 * log_ndtr(2.0)
+    assert found[1] - found[0] == pytest.approx(half - most, abs=1e-6)
 
 
 def test_limits_that_the_data_keep_cost_little() -> None:

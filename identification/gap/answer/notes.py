@@ -13,7 +13,7 @@ from identification.gap.explanations.explanation import Explanation, SearchResul
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint, troubles_named
 from identification.gap.judging.broken import broken
-from identification.gap.judging.strain import LIMIT, what_is_strained
+from identification.gap.judging.strain import what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY, SWINGS
 from identification.gap.recording.snaps import Snaps
@@ -217,10 +217,10 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
         return ()
     words, fitted = " and ".join(best.troubles), fit(found.engine, best)
     off, word = broken(found.engine, best, fitted)
-    if off > LIMIT:
+    if off > 1:
         text = (
-            f"What explains the gap best ({words}) takes a {word} that lies {off:.0f} standard "
-            "deviations outside what that word allows: it was not believed."
+            f"What explains the gap best ({words}) takes a {word} outside what that word allows, "
+            "and what is allowed explains less: it was not believed."
         )
         return (Note(REMARK, text),)
     if not found.engine.bench.data.arm:

@@ -21,6 +21,7 @@ from identification.arrays import Array, Flags, Ints
 from identification.gap.model.variants import Variant
 
 _TINY = 1e-300
+_KEPT = 6.0  # standard deviations: so far on its right side none costs anything
 _NEAR = 1 - 1e-9  # as correlated as two may be
 
 
@@ -86,12 +87,13 @@ def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Arr
     shares = log_shares(limits, which, before)
     share = shares[:, 0]
     out = np.where(asked[:, 0], log_ndtr(z[:, 0]) - share, 0.0)
-    wrong = (z[:, 1:] < 0) & asked[:, 1:]  # the right side of a limit costs nothing
-    alone = np.zeros(wrong.shape)
-    alone[wrong] = log_ndtr(z[:, 1:][wrong]) - shares[:, 1:][wrong]
+    near = (z[:, 1:] < _KEPT) & asked[:, 1:]
+    alone = np.zeros(near.shape)  # a limit that is kept earns nothing
+    alone[near] = np.minimum(log_ndtr(z[:, 1:][near]) - shares[:, 1:][near], 0.0)
     out += alone.sum(axis=1)
-    far = np.flatnonzero((wrong.any(axis=1) | (z[:, 0] < 0)) & asked[:, 0])
-    if far.size and wrong.shape[1]:
+    wrong = np.any((z < 0) & asked, axis=1)
+    far = np.flatnonzero(wrong & asked[:, 0])
+    if far.size and len(asked.T) > 1:
         first, more = (centre[far, :1], variance[far, :1]), (centre[far, 1:], variance[far, 1:])
         common = np.einsum("nr,nmr->nm", roots[far, 0], roots[far, 1:])
         apart = np.where(asked[far, 1:], _distance(*more, *first, common), 0.0).max(axis=1)
@@ -147,9 +149,14 @@ def all_kept(limits: Sequence[Kept]) -> float:
 
 
 def distance(z: Array, unit: Array) -> float:
-    """Mahalanobis distance of a mean from where all its sums z (m,) are positive. The
-    least-distance problem of Lawson and Hanson (Solving Least Squares Problems, 1974, chapter
-    23)."""
+    """Mahalanobis distance of a mean from where all its sums z (m,) are positive."""
+    return float(np.linalg.norm(nearest(z, unit)))
+
+
+def nearest(z: Array, unit: Array) -> Array:
+    """(r,) shortest way from a mean to where all its sums are positive, z (m,), which grow along
+    it by unit (m, r). The least-distance problem of Lawson and Hanson (Solving Least Squares
+    Problems, 1974, chapter 23)."""
     from scipy.optimize import lsq_linear, nnls
 
     m, r = unit.shape
@@ -160,7 +167,7 @@ def distance(z: Array, unit: Array) -> float:
     except RuntimeError:
         pushes = lsq_linear(both, last, (0.0, np.inf), "bvls", max_iter=_TURNS * m).x
     left = both @ pushes - last
-    return float(np.sqrt(left[:-1] @ left[:-1])) / max(float(-left[-1]), _TINY)
+    return np.asarray(left[:-1] / max(float(-left[-1]), _TINY))
 
 
 _TURNS = 100

@@ -44,6 +44,18 @@ class Fit:
         """`pulls` of one part."""
         return self.pulls[len(self.base) :][self._where(index)]
 
+    def moved(self, engine: Engine, index: int, by: Array) -> Array:
+        """(n,) m by which the fitted response moves where the coefficients of one part move by (k,)
+        and all others follow as the data let them."""
+        start = len(self.base)
+        mine = self._where(index)
+        mine = slice(start + mine.start, start + mine.stop)
+        pulled = np.linalg.pinv(self.joint_covariance[mine, mine], hermitian=True) @ by
+        every = self.joint_covariance[:, mine] @ pulled
+        columns = engine.columns(c for p in self.parts for c in p.variant.columns)
+        moves = engine.base.columns @ every[:start] + columns @ every[start:]
+        return np.asarray(moves[: engine.bench.rows.n])
+
     def _where(self, index: int) -> slice:
         start = sum(len(p.variant.columns) for p in self.parts[:index])
         return slice(start, start + len(self.parts[index].variant.columns))

@@ -118,7 +118,9 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     hands = engine.bench.rows.rms(open_to_hands(engine, fitted))
     if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
         good = min(good, explanation.log_good)
-    asked = max(strain(engine, fitted, explanation.eta), broken(engine, explanation, fitted)[0])
+    asked = max(
+        strain(engine, fitted, explanation.eta), LIMIT * broken(engine, explanation, fitted)[0]
+    )
     off = most_off(engine, fitted)
     return _unstrained(replace(explanation, log_good=good, off=off), asked)
 
@@ -172,4 +174,5 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    return _unstrained(replace(explanation, log_good=good), broken(engine, explanation, fitted)[0])
+    off = broken(engine, explanation, fitted)[0]
+    return _unstrained(replace(explanation, log_good=good), LIMIT * off)

@@ -33,7 +33,9 @@ SLIPPING = tuple(law + THAT_SLIPS for law in EXPONENTIAL)
 LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
-_AT_HALF = 0.18  # a spectrum as strong everywhere slips a quarter
+# Of what slips at all of the load, at half of it: a spectrum as strong everywhere slips a quarter,
+# one strength of 0.44 of the load, or strengths from a quarter to 0.7 of it, a tenth.
+_AT_HALF, _AT_HALF_OF_AN_ARM = 0.18, 0.14
 _AT_ONCE = 0.05  # of the largest load
 _TURNED = 0.01  # of the largest product of both
 _HARDLY = 0.2  # of the largest load: what slips beyond the rest of it shows less
@@ -146,9 +148,9 @@ def no_knee(
     first half of its largest, of what it has at the largest torque (n,). Friction acts from the
     first load on; what holds half the load and then gives way has yielded. What slips at once does
     not count, as springs do that too. Of a specimen only where that is loaded from one side: to and
-    fro, strokes far beyond the first slip show friction of one strength. path: what was cycled
-    before goes all the way back first, and what hangs on weights has slipped by these. saturates:
-    of a load that does, most of what comes through, Nm."""
+    fro, strokes far beyond the first slip show friction of one strength; what was cycled before
+    goes all the way back first. path: with the weights that hang on it. saturates: of a load that
+    does, most of what comes through, Nm."""
     size, top = np.abs(torque), int(np.abs(torque).argmax())
     if bench.data.arm:
         half = 0.5 * float(size[top])
@@ -157,14 +159,15 @@ def no_knee(
         half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
     else:
         return None
-    slips = (2.0 if path.worked_in else 1.0) * radius
-    if path.weight is not None:
+    slips = (2.0 if path.worked_in and not bench.data.arm else 1.0) * radius
+    if path.weight is not None:  # what that pushes the same way has slipped already
         hung = float(np.sign(torque[top]) * path.at_rows(path.weight)[top])
-        slips = np.maximum(radius - np.clip(hung, -radius, radius), 0.0)
+        slips = np.maximum(radius - max(hung, 0.0), 0.0)
     loads = np.array([[half], [size[top]]])
     loads = loads if saturates is None else saturating(loads, saturates)
     early, late = np.maximum(loads - slips, 0.0) * (slips > _AT_ONCE * loads[1])
-    return np.asarray(early - _AT_HALF * late)[None, :] / max(float(late.max()), _TINY)
+    least = _AT_HALF_OF_AN_ARM if bench.data.arm else _AT_HALF
+    return np.asarray(early - least * late)[None, :] / max(float(late.max()), _TINY)
 
 
 def exponential_laws(bench: Bench) -> tuple[str, ...]:
