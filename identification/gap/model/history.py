@@ -45,22 +45,40 @@ def play(
     to zero (the arm moved to another pose, or a controller took the joint back). weight (n, 1):
     what came on beside the load then, and stays; states count from where it left them.
     """
-    # Every row clips the state before it to [x - r, x + r]; clips of clips are clips, so that all
-    # prefixes are found in log2(n) passes over the rows.
     least, most = weight - radius, weight + radius
     hung = clipped(0.0, least, most)
     low, high = load + least, load + most
-    back = (clipped(least, low, high), clipped(most, low, high))  # from anywhere without load
-    still = clipped(hung, low, high)
-    low = np.where(fresh[:, None], still, np.where(rest[:, None], back[0], low))
-    high = np.where(fresh[:, None], still, np.where(rest[:, None], back[1], high))
+    least, most, start = (np.broadcast_to(v, load.shape) for v in (least, most, hung))
+    back, new = np.flatnonzero(rest & ~fresh), np.flatnonzero(fresh)
+    # from anywhere without load
+    low[back], high[back] = (clipped(v[back], low[back], high[back]) for v in (least, most))
+    low[new] = high[new] = clipped(start[new], low[new], high[new])
+    return np.asarray(_clips(low, high, start[:1]) - hung)
+
+
+_MANY = 8000  # numbers, whose halves take less time than the calls for these
+
+
+def _clips(low: Array, high: Array, start: Array) -> Array:
+    """(n, k) states of what starts at (1, k), and which every row clips to [low, high] (n, k),
+    which are lost. Clips of clips are clips: of many rows every second state is found by half as
+    many clips, and the rest from these; of few all prefixes in log2(n) passes over the rows."""
+    n = len(low)
+    if low.size > _MANY:
+        out, first, then = np.empty_like(low), slice(0, n - n % 2, 2), slice(1, n, 2)
+        ends = low[then], high[then]
+        lower, upper = clipped(low[first], *ends), clipped(high[first], *ends)
+        out[then] = _clips(lower, upper, start)
+        before = np.concatenate([start, out[1 : n - 1 : 2]])
+        out[::2] = clipped(before, low[::2], high[::2])
+        return out
     step = 1
-    while step < len(load):
+    while step < n:
         lower = clipped(low[:-step], low[step:], high[step:])
         upper = clipped(high[:-step], low[step:], high[step:])
         low[step:], high[step:] = lower, upper
         step *= 2
-    return np.asarray(clipped(np.atleast_2d(hung)[:1], low, high) - hung)
+    return clipped(start, low, high)
 
 
 def clipped(values: Array | float, low: Array, high: Array) -> Array:

@@ -64,6 +64,8 @@ def load_path(
     (overshoot (n,), 0: it did not) of that load, or first (onward (n,), likewise) beyond that of
     the row before."""
     on = np.broadcast_to(np.asarray(onward), load.shape)
+    if not (overshoot.any() or on.any()):  # most paths go from row to row
+        return Path(load, rest, fresh, np.ones(len(load), dtype=bool), weight)
     further = np.where(on != 0, np.roll(load, 1) * (1.0 + on), load * (1.0 + overshoot))
     row = np.repeat(np.arange(len(load)), 1 + ((overshoot != 0) | (on != 0)))
     kept = np.append(row[1:] != row[:-1], True)

@@ -260,7 +260,11 @@ class Paths:
 
     def _left_along(self, overshoot: Array, first: _Fitted) -> Array:
         """What is left (white) along a path (n,), with coefficients as they fit first."""
-        effect = self._effect(overshoot) @ first.coefficients
+        start, effect = 0, np.zeros(len(first.effect))
+        for part in self._parts:
+            columns = part.along(overshoot)
+            effect += columns @ first.coefficients[start : start + columns.shape[1]]
+            start += columns.shape[1]
         return first.left - self._white((effect - first.effect)[:, None])[:, 0]
 
     def _hold_by_hold(
