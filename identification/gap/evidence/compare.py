@@ -160,9 +160,12 @@ def _line(engine: Engine, joint: int) -> Array:
 
 
 def mean_square(engine: Engine, v: Variant) -> Array:
-    """(k, k): the same of one variant."""
-    columns, joints = np.array([v.columns]), np.array([_slips_on(v)])
-    return np.asarray(mean_squares(engine, columns, joints, imperfect(v)[None])[0])
+    """(k, k): the same of one variant, kept for the next explanation that has it."""
+    if v not in engine.cache:
+        columns, joints = np.array([v.columns]), np.array([_slips_on(v)])
+        engine.cache[v] = mean_squares(engine, columns, joints, imperfect(v)[None])[0]
+    found: Array = engine.cache[v]
+    return found
 
 
 def imperfect(variant: Variant) -> Array:
@@ -179,7 +182,9 @@ def condition(level: NoiseLevel, columns: tuple[int, ...], root: Array, scale: f
     """The level with an effect of fixed scale integrated out as well."""
     c = np.array(columns)
     T = scale * root
-    beside = level.beside(columns) - level.taken[:, c].T @ level.taken
+    beside, before = level.beside(columns), level.taken
+    if len(before):  # of the whole pool, which is not copied where there is nothing to take
+        beside = beside - before[:, c].T @ before
     factor = factor_of(np.eye(len(c)) + T.T @ beside[:, c] @ T)
     turn = np.linalg.solve(factor, T.T)
     cross, left = turn @ beside, turn @ level.moment[c]
@@ -188,7 +193,7 @@ def condition(level: NoiseLevel, columns: tuple[int, ...], root: Array, scale: f
         moment=level.moment - cross.T @ left,
         log_base=level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
         misfit=level.misfit - float(left @ left),
-        taken=np.vstack([level.taken, cross]),
+        taken=np.vstack([before, cross]) if len(before) else cross,
     )
 
 

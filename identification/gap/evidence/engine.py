@@ -75,7 +75,7 @@ class Engine:
         """target: stacked observation minus the simulation's prediction."""
         self.bench, self.base, self.target, self.etas = bench, base, target, etas
         self.sigma = bench.sigma
-        self.cache: dict[object, Array] = {}
+        self.cache: dict[object, Any] = {}
         self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
         self.arranged: dict[object, Any] = {}  # by shape and size
         self.limits: dict[object, Any] = {}
@@ -132,9 +132,7 @@ class Engine:
         step = max(1, _AT_ONCE // self.bench.layout.size)
         blocks = [added[i : i + step] for i in range(0, len(added), step)]
         parts = [self._whiten(self.columns(block)) for block in blocks]
-        beside = [
-            np.hstack(b) for b in zip(*(self._common(p, self._weights) for p in parts), strict=True)
-        ]
+        beside = zip(*(self._common(p, self._weights) for p in parts), strict=True)
         self._levels = [self._grown(*each) for each in zip(self._levels, beside, strict=True)]
         self._taken.put(parts)
 
@@ -300,14 +298,15 @@ class Engine:
         none = Growing(np.zeros((0, kb + count)))
         return _Integrated(turn, left, log_base, misfit, none)
 
-    def _grown(self, level: NoiseLevel, beside: Array) -> NoiseLevel:
-        """A level with further columns, of which the products (c, p) with its base are known."""
-        i = level.number
-        base = self._bases[i]
-        fresh = base.turn @ beside[1 : 1 + base.turn.shape[1]]
-        moment = beside[0] - fresh.T @ base.left
-        base.pool.put([fresh.T])
-        both = np.concatenate([level.moment, moment])
+    def _grown(self, level: NoiseLevel, beside: Sequence[Array]) -> NoiseLevel:
+        """A level with further columns, block by block, of which the products (c, p) with its base
+        are known."""
+        base = self._bases[level.number]
+        rows = slice(1, 1 + base.turn.shape[1])
+        fresh = [products[rows].T @ base.turn.T for products in beside]  # as the pool keeps them
+        moments = [b[0] - own @ base.left for b, own in zip(beside, fresh, strict=True)]
+        base.pool.put(fresh)
+        both = np.concatenate([level.moment, *moments])
         return replace(level, moment=both, taken=np.zeros((0, len(both))))
 
 

@@ -23,8 +23,8 @@ class Growing:
         below = list(parts)
         start, count = len(self.values), len(self.values) + sum(map(len, below))
         if count > len(self._room):
-            room = int(_AHEAD * count) if start else count  # many are never added to
-            self._room = np.empty((room, self.values.shape[1]))
+            # what is never added to takes no memory, as nobody writes there
+            self._room = np.empty((int(_AHEAD * count), self.values.shape[1]))
             self._room[:start] = self.values
         np.concatenate(below, out=self._room[start:count])
         self.values = self._room[:count]
