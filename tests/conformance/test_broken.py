@@ -72,7 +72,8 @@ def test_what_hardly_moves_the_target_breaks_nothing(monkeypatch: pytest.MonkeyP
     moved = engine.bench.rows.rms(0.05 * engine.columns([v.columns[3]])[: engine.bench.rows.n, 0])
     engine.structural = moved / 0.05
     one = Explanation((Part(v, 0.1),), 0.0, 0.0, (0.0,), 0.0)
-    assert broken(engine, one, judging.fit(engine, one))[0] == pytest.approx(0.05 / 0.065)
+    known = vars(judging)["fit"](engine, one)  # as `off` had it
+    assert broken(engine, one, known)[0] == pytest.approx(0.05 / 0.065)
 
 
 def test_all_else_follows_where_a_limit_is_kept() -> None:
@@ -84,6 +85,33 @@ def test_all_else_follows_where_a_limit_is_kept() -> None:
     alone = engine.columns([v.columns[-1]])[: engine.bench.rows.n, 0] * 0.05
     rows = engine.bench.rows
     assert rows.rms(fitted.moved(engine, 0, by)) < 0.5 * rows.rms(alone)
+
+
+def test_a_floor_counts_and_a_bench_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a rig without an arm a part may be off by a share of its largest coefficient, too."""
+    engine, v = frictions()
+    k = len(v.columns)
+    held = replace(v, positive=None, each=(), within=np.eye(k)[:1], floor=np.full(1, 0.2))
+    w, sd = np.full(k, 0.1), np.full(k, 0.02)
+    assert off(engine, held, w, monkeypatch, sd) == pytest.approx(5.0 / 5.5)
+    bench = replace(engine.bench, data=replace(engine.bench.data, arm=False))
+    monkeypatch.setattr(engine, "bench", bench)
+    met = np.hypot(0.02, 0.05 * 0.1)
+    assert off(engine, held, w, monkeypatch, sd) == pytest.approx(0.1 / met / 5.5)
+
+
+def test_a_law_errs_alike_along_its_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, v = frictions()
+    one = Explanation((Part(v, 0.1),), 0.0, 1e-5, (0.0,), 0.0)
+    asked: list[bool] = []
+
+    def noted(_: Engine, explanation: Explanation, *, alike: bool = False) -> Fit:
+        asked.append(alike)
+        return fit(engine, explanation)
+
+    monkeypatch.setattr(judging, "fit", noted)
+    broken(engine, one, fit(engine, one))
+    assert asked == [True]
 
 
 def test_of_several_parts_the_one_that_is_farthest_off_counts(

@@ -9,7 +9,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.effects import library
+from identification.gap.effects import contact_seating, library
 from identification.gap.model.bench import Bench, make_bench
 from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
@@ -76,6 +76,28 @@ def test_a_curve_that_goes_back_under_more_load_is_none(name: str) -> None:
             column = bench.columns[v.columns[i]]
             left = [gives(bench, v.joint, w * column) for w in either if np.isfinite(w)]
             assert 0.0 < min(left) < (0.5 if i == 0 else 1.0)
+
+
+@pytest.mark.parametrize("name", ["curve", "bend 0.5", "odd curve, tool 1.5 kg"])
+def test_pieces_that_each_leave_compliance_may_leave_none_together(name: str) -> None:
+    bench = make_bench(arm_data())
+    v = next(v for v in library(bench, ["joint_nonlinear_stiffness"]) if v.label.endswith(name))
+    pair = np.zeros((2, len(v.columns)))
+    pair[0, 0] = pair[1, 1] = -0.6
+    assert np.all(v.within @ pair.T > v.floor[:, None])
+    assert np.any(v.within @ pair.sum(axis=0) < v.floor)
+
+
+def test_a_gap_of_a_seat_closes_at_low_force() -> None:
+    """At nearly half of the load it is a knee; what is looked for about one that was found, too."""
+    bench = make_bench(arm_data())
+    top = float(np.abs(bench.load).max())
+    seats = library(bench, ["contact_seating"])
+    closing = [f for v in seats for law, f in v.info["laws"] if law == "slack"]
+    assert max(closing) == pytest.approx(0.35 * top)
+    last = next(v for v in seats if v.label == "slack 0.2")
+    about = [v.info["force_N"] for v in contact_seating.refined(bench, last, 3.0)]
+    assert 0.3 * top < max(about) <= 0.35 * top
 
 
 def gives(bench: Bench, joint: int, by: Array) -> float:

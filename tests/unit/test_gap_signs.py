@@ -128,6 +128,17 @@ def test_a_floor_that_most_of_the_prior_keeps_is_dearer_to_break() -> None:
     assert found[1] - found[0] == pytest.approx(half - most, abs=1e-6)
 
 
+def test_a_shape_of_any_sign_is_charged_for_its_floors() -> None:
+    """In the table of all shapes as well: alike but for a floor that the data are far below."""
+    engine = small_engine(small_bench())
+    engine.target[: engine.bench.rows.n] -= 3.0 * engine.bench.columns[0][: engine.bench.rows.n]
+    engine = Engine(engine.bench, engine.base, engine.target, engine.etas)
+    free = variant("joint_creep", "free", [0], (3.0,), positive=False)
+    held = replace(free, label="held", within=np.ones((1, 1)), floor=np.full(1, -0.5))
+    found = [score(engine, engine.levels[:1], [v])[0].log_evidence for v in (free, held)]
+    assert found[1] < found[0] - 5.0
+
+
 def test_limits_that_the_data_keep_cost_little() -> None:
     mean, covariance = np.array([0.6, 0.8]), np.array([[0.04, -0.03], [-0.03, 0.04]])
     exact = sampled(mean, covariance, np.eye(2), np.array([[1.0, 1.0], [1, 0], [0, 1]]), 0.15)

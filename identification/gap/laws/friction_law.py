@@ -34,7 +34,7 @@ LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
 # Of what slips at all of the load, at half of it: a spectrum as strong everywhere slips a quarter,
-# one strength of 0.44 of the load, or strengths from a quarter to 0.7 of it, a tenth.
+# one strength of 0.42 of the load, or strengths from 0.24 to 0.7 of it, a seventh.
 _AT_HALF, _AT_HALF_OF_AN_ARM = 0.18, 0.14
 _AT_ONCE = 0.05  # of the largest load
 _TURNED = 0.01  # of the largest product of both
@@ -167,7 +167,7 @@ def no_knee(
     loads = loads if saturates is None else saturating(loads, saturates)
     early, late = np.maximum(loads - slips, 0.0) * (slips > _AT_ONCE * loads[1])
     least = _AT_HALF_OF_AN_ARM if bench.data.arm else _AT_HALF
-    return np.asarray(early - least * late)[None, :] / max(float(late.max()), _TINY)
+    return np.asarray(early - least * late)[None, :] / max(float(late.max(initial=0.0)), _TINY)
 
 
 def exponential_laws(bench: Bench) -> tuple[str, ...]:
