@@ -346,6 +346,12 @@ def test_no_law_is_met_more_closely_than_its_least_imperfection() -> None:
     assert least_size(etas, 1e-14) == -np.inf  # so small that any will do
 
 
+def test_limits_that_no_mean_keeps_are_far_away() -> None:
+    with np.errstate(all="raise"):
+        away = distance(np.array([-1.0, -1.0]), np.array([[1.0], [-1.0]]))
+    assert 1e8 < away < np.inf
+
+
 def test_many_means_at_once_are_as_far_as_each_alone() -> None:
     """Of few and of many sums that are in the way, some of which are free."""
     draw = np.random.default_rng(7)

@@ -21,6 +21,7 @@ from identification.arrays import Array, Flags, Ints
 from identification.gap.model.variants import Variant
 
 _TINY = 1e-300
+_NONE, _NOWHERE = 1e-14, 1e9  # below it that is rounding: no mean keeps all limits; so far then
 _KEPT = 6.0  # standard deviations: so far on its right side none costs anything
 _NEAR = 1 - 1e-9  # as correlated as two may be
 
@@ -167,7 +168,8 @@ def nearest(z: Array, unit: Array) -> Array:
     except RuntimeError:
         pushes = lsq_linear(both, last, (0.0, np.inf), "bvls", max_iter=_TURNS * m).x
     left = both @ pushes - last
-    return np.asarray(left[:-1] / max(float(-left[-1]), _TINY))
+    near = float(-left[-1])  # 1 over 1 and the square of the distance
+    return np.asarray(left[:-1] / near) if near > _NONE else np.full(r, _NOWHERE)
 
 
 _TURNS = 100
