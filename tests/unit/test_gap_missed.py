@@ -54,7 +54,7 @@ def test_what_a_joint_was_seen_to_do_no_mounting_did(
     q[:, BENT] = turned * turns
     moved = bench.lever[:, BENT] * turned
     target = bench.stacked(moved, q=q)
-    for other in ("strain", "_left"):  # of the joint's spring, and of the displacement
+    for other in ("strain", "response_left"):  # of the joint's spring, and of the displacement
         monkeypatch.setattr(leftover, other, lambda *_: 0.0)
     mounting = part("base_slip", [bench.add(bench.stacked(moved))])
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))

@@ -49,7 +49,8 @@ class Limits:
                 rows[i, 0, :own], floor[i, 0], asked[i, 0] = v.positive, v.least, True
             rows[i, 1 + np.arange(len(alone)), alone] = 1.0
             sums = slice(1 + len(alone), 1 + len(alone) + len(v.within))
-            rows[i, sums, :own], floor[i, sums] = v.within, v.floor
+            if len(v.within):
+                rows[i, sums, :own], floor[i, sums] = v.within, v.floor
             asked[i, 1 : sums.stop] = True
         return cls(rows, floor, asked)
 

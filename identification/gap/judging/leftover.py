@@ -21,7 +21,7 @@ from identification.gap.explanations.explanation import (
     kept_within,
     may_remain,
 )
-from identification.gap.explanations.fit import fit
+from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import (
     ARM_AS_STATED,
     AS_STATED,
@@ -118,11 +118,15 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     hands = engine.bench.rows.rms(open_to_hands(engine, fitted))
     if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
         good = min(good, explanation.log_good)
-    asked = max(
-        strain(engine, fitted, explanation.eta), LIMIT * broken(engine, explanation, fitted)[0]
-    )
+    asked = max(strain(engine, fitted, explanation.eta), _outside(engine, explanation, fitted))
     off = most_off(engine, fitted)
     return _unstrained(replace(explanation, log_good=good, off=off), asked)
+
+
+def _outside(engine: Engine, explanation: Explanation, fitted: Fit) -> float:
+    """How far it lies outside the limits of its words, as what it asks of its priors is judged: by
+    the square, as what others' laws do within is told sharply from what they don't."""
+    return LIMIT * broken(engine, explanation, fitted)[0] ** 2
 
 
 def _unstrained(explanation: Explanation, asked: float) -> Explanation:
@@ -174,5 +178,5 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    off = broken(engine, explanation, fitted)[0]
-    return _unstrained(replace(explanation, log_good=good), LIMIT * off)
+    outside = _outside(engine, explanation, fitted)
+    return _unstrained(replace(explanation, log_good=good), outside)

@@ -147,13 +147,16 @@ def no_knee(
     """(1, k): that what slips at strengths radius (k,) has slipped by a good part where the load is
     first half of its largest, of what it has at the largest torque (n,). Friction acts from the
     first load on; what holds half the load and then gives way has yielded. What slips at once does
-    not count, as springs do that too. Of a specimen only where that is loaded from one side: to and
-    fro, strokes far beyond the first slip show friction of one strength; what was cycled before
+    not count, as springs do that too. Only where the load stays on one side: to and fro, strokes
+    far beyond the first slip show friction of one strength. Of a specimen what was cycled before
     goes all the way back first. path: with the weights that hang on it. saturates: of a load that
     does, most of what comes through, Nm."""
     size, top = np.abs(torque), int(np.abs(torque).argmax())
     if bench.data.arm:
+        run = bench.rows.run == bench.rows.run[top]
         half = 0.5 * float(size[top])
+        if float((np.sign(torque[top]) * torque[run]).min()) < -half:
+            return None
     elif bench.course.one_sided:
         force = np.abs(bench.rows.measured_force)
         half = float(size[int(np.argmax(force >= 0.5 * force.max()))])

@@ -145,6 +145,9 @@ def _apart(rows: Rows) -> Array:
 _TOGETHER = 0.02
 
 
+_LITTLE = 2.0  # times what is stated: what scatters more was misjudged
+
+
 _ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
 
 
@@ -241,9 +244,9 @@ def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) ->
         least = 0.0 if data.arm else 0.33 * data.instruments.displacement
         return alone if measured is None else np.full(rows.n, max(measured, least))
     measured = _scatter(data, data.displacement, hold)
-    if measured is None and data.arm:  # short holds tell whether more than is stated
-        three = scatter_of_three(data.displacement, hold)
-        measured = three if three and three > data.instruments.displacement else None
+    if measured is None and data.arm:  # short holds tell of a little more than is stated
+        stated, three = data.instruments.displacement, scatter_of_three(data.displacement, hold)
+        measured = three if three and stated < three < _LITTLE * stated else None
     if measured is None:
         return alone
     # never less than a third of what is stated: second differences can't see everything
