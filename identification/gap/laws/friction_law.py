@@ -34,8 +34,8 @@ LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
 # Of what slips at all of the load, at half of it: a spectrum as strong everywhere slips a quarter,
-# one strength of 0.42 of the load, or strengths from 0.24 to 0.7 of it, a seventh.
-_AT_HALF, _AT_HALF_OF_AN_ARM = 0.18, 0.14
+# one strength of 0.4 of the load, or strengths from a fifth to 0.7 of it, a sixth.
+_AT_HALF, _AT_HALF_OF_AN_ARM = 0.18, 0.16
 _AT_ONCE = 0.05  # of the largest load
 _TURNED = 0.01  # of the largest product of both
 _HARDLY = 0.2  # of the largest load: what slips beyond the rest of it shows less
