@@ -76,10 +76,46 @@ ENOUGH = 30  # second differences: then their scatter is known to about an eight
 def scatter_within(values: Array, hold: Ints) -> float | None:
     """Standard deviation of the white part of values (n,), from second differences within holds,
     the first sample left out (it may lag); trimmed at 5 %, corrected for that (normal noise:
-    0.8713). None where there are too few."""
-    second = values[3:] - 2 * values[2:-1] + values[1:-2] if len(values) > 3 else np.zeros(0)
-    same = (hold[3:] == hold[:-3]) if len(values) > 3 else np.zeros(0, dtype=bool)
-    return _trimmed(second[same] / 6**0.5)
+    0.8713). Of holds that settle, in their later parts. None where there are too few."""
+    part = _late(hold, _FOUR) if _settles(values, hold) else hold
+    return _trimmed(_second(values, part)[0])
+
+
+def _settles(values: Array, hold: Ints) -> bool:
+    """Whether values (n,) scatter more right after the first samples of their holds than later on:
+    a channel that lags by two samples, or a screw that relaxes, makes second differences which are
+    no noise."""
+    late, _ = _second(values, _late(hold, _FOUR))
+    each, which = _second(values, hold)
+    early = each[np.diff(which, prepend=-1) != 0]
+    begins, ends = _trimmed(early), _trimmed(late)
+    if not begins or not ends:
+        return False
+    chance = (1 / (2 * len(early)) + 1 / (2 * len(late))) ** 0.5
+    return float(np.log(begins / ends)) > _BEYOND_CHANCE * chance
+
+
+_FOUR = 4  # samples that a second difference needs, and one before
+_BEYOND_CHANCE = 3.0  # standard errors of the logarithm of a ratio of two standard deviations
+
+
+def _late(hold: Ints, least: int) -> Ints:
+    """(n,) the second halves of the holds, of at least so many samples; every one before alone."""
+    first = first_rows(hold)
+    count = np.diff(np.append(first, len(hold)))
+    place = np.arange(len(hold)) - np.repeat(first, count)
+    begin = np.clip(count - least, 0, count // 2)
+    return np.cumsum(place <= np.repeat(begin, count)).astype(np.int64)
+
+
+def _second(values: Array, hold: Ints) -> tuple[Array, Ints]:
+    """(k,) second differences within holds but for their first samples, as large as the values
+    scatter; (k,) their holds."""
+    if len(values) < _FOUR:
+        return np.zeros(0), hold[:0]
+    same = hold[3:] == hold[:-3]
+    second = values[3:] - 2 * values[2:-1] + values[1:-2]
+    return np.asarray(second[same] / 6**0.5), hold[3:][same]
 
 
 def scatter_of_three(values: Array, hold: Ints) -> float | None:
@@ -112,6 +148,7 @@ def swing_within(values: Array, hold: Ints) -> float:
     """rms of what values (n,) have in common with the next one about the line through their hold: a
     vibration that samples follow, or noise of many colours; not their own noise, nor what settles.
     0 where holds are too short, or where chance does as much."""
+    hold = _late(hold, _SWINGS) if _settles(values, hold) else hold
     count = np.bincount(hold)[hold]
 
     def about_mean(x: Array) -> Array:
