@@ -92,7 +92,7 @@ def _settles(values: Array, hold: Ints) -> bool:
     if not begins or not ends:
         return False
     chance = (1 / (2 * len(early)) + 1 / (2 * len(late))) ** 0.5
-    return float(np.log(begins / ends)) > _BEYOND_CHANCE * chance
+    return bool(np.log(begins / ends) > _BEYOND_CHANCE * chance)
 
 
 _FOUR = 4  # samples that a second difference needs, and one before
