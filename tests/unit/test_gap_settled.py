@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.arrays import Array, Ints
+from identification.gap.model.bench import make_bench
 from identification.gap.recording.holds import scatter_within, swing_within
+from tests.unit.test_gap_operators import bench_data
 
 SD, HOLDS = 2.0, 80
 
@@ -42,3 +46,17 @@ def test_what_trembles_to_the_end_of_its_holds_swings() -> None:
     trembles = 40.0 * np.sin(2 * np.pi * np.tile(np.arange(12.0), HOLDS) / 5)
     for each in (trembles, values + trembles):
         assert swing_within(each, hold) > 4 * SD
+
+
+@pytest.mark.parametrize("samples", [4, 5])
+def test_short_holds_that_settle_all_the_time_tell_no_noise(samples: int) -> None:
+    values, hold = held(samples, 100.0, lag=2.0)
+    assert scatter_within(values, hold) is None
+
+
+def test_a_channel_that_lags_in_short_holds_is_not_said_to_scatter() -> None:
+    """What was stated of it stands, and nothing is said of vibrations."""
+    values, hold = held(4, 100.0, lag=2.0)
+    force = hold.astype(float)
+    data = replace(bench_data(force, 1e-6 * values, step=hold + 1), arm=True)
+    assert make_bench(data).noise.raised == 1.0

@@ -76,27 +76,42 @@ ENOUGH = 30  # second differences: then their scatter is known to about an eight
 def scatter_within(values: Array, hold: Ints) -> float | None:
     """Standard deviation of the white part of values (n,), from second differences within holds,
     the first sample left out (it may lag); trimmed at 5 %, corrected for that (normal noise:
-    0.8713). Of holds that settle, in their later parts. None where there are too few."""
+    0.8713). Of holds that settle, in their later parts. None where there are too few, or most of
+    them is the way that a hold was come to."""
     part = _late(hold, _FOUR) if _settles(values, hold) else hold
-    return _trimmed(_second(values, part)[0])
+    return None if _goes_on(values, part) else _trimmed(_second(values, part)[0])
 
 
 def _settles(values: Array, hold: Ints) -> bool:
     """Whether values (n,) scatter more right after the first samples of their holds than later on:
     a channel that lags by two samples, or a screw that relaxes, makes second differences which are
     no noise."""
-    late, _ = _second(values, _late(hold, _FOUR))
     each, which = _second(values, hold)
+    late, _ = _second(values, _late(hold, _FOUR))
     early = each[np.diff(which, prepend=-1) != 0]
     begins, ends = _trimmed(early), _trimmed(late)
     if not begins or not ends:
         return False
     chance = (1 / (2 * len(early)) + 1 / (2 * len(late))) ** 0.5
-    return bool(np.log(begins / ends) > _BEYOND_CHANCE * chance)
+    return bool(np.log(begins / ends) > _SURELY * chance)
+
+
+def _goes_on(values: Array, hold: Ints) -> bool:
+    """Whether the second differences of values (n,) go against the way that their holds were come
+    to, by more than chance, and mostly: it slows down for all of a short hold."""
+    each, which = _second(values, hold)
+    if len(each) < ENOUGH:
+        return False
+    first = first_rows(hold)
+    came = np.sign(np.diff(values[first], prepend=values[0]))
+    against = -each * came[np.searchsorted(hold[first], which)]
+    rms = float(np.sqrt(np.mean(against**2)))
+    return bool(against.mean() > rms * max(_SURELY / len(each) ** 0.5, _MOSTLY))
 
 
 _FOUR = 4  # samples that a second difference needs, and one before
-_BEYOND_CHANCE = 3.0  # standard errors of the logarithm of a ratio of two standard deviations
+_SURELY = 3.0  # standard errors
+_MOSTLY = 0.6  # of their rms
 
 
 def _late(hold: Ints, least: int) -> Ints:
