@@ -230,9 +230,9 @@ def tangent(rows: Rows, force_sd: float) -> Array:
 
 
 def _scatter(data: GapData, values: Array, hold: Ints) -> float | None:
-    """What values (n,) scatter in holds. Of an arm, whose instruments are known, by holds that are
-    long enough."""
-    found = scatter_within(values, hold)
+    """What values (n,) scatter in holds, which the force tells how they were come to. Of an arm,
+    whose instruments are known, by holds that are long enough."""
+    found = scatter_within(values, hold, data.force)
     return scatter_of_three(values, hold) if found is None and not data.arm else found
 
 

@@ -73,13 +73,13 @@ _MISJUDGED = 2.0
 ENOUGH = 30  # second differences: then their scatter is known to about an eighth
 
 
-def scatter_within(values: Array, hold: Ints) -> float | None:
+def scatter_within(values: Array, hold: Ints, comes: Array | None = None) -> float | None:
     """Standard deviation of the white part of values (n,), from second differences within holds,
     the first sample left out (it may lag); trimmed at 5 %, corrected for that (normal noise:
     0.8713). Of holds that settle, in their later parts. None where there are too few, or most of
-    them is the way that a hold was come to."""
+    them goes by the way that a hold was come to; comes (n,): what tells that, if not the values."""
     part = _late(hold, _FOUR) if _settles(values, hold) else hold
-    return None if _goes_on(values, part) else _trimmed(_second(values, part)[0])
+    return None if _goes_on(values, part, values if comes is None else comes) else _trimmed(_second(values, part)[0])
 
 
 def _settles(values: Array, hold: Ints) -> bool:
@@ -96,17 +96,17 @@ def _settles(values: Array, hold: Ints) -> bool:
     return bool(np.log(begins / ends) > _SURELY * chance)
 
 
-def _goes_on(values: Array, hold: Ints) -> bool:
-    """Whether the second differences of values (n,) go against the way that their holds were come
-    to, by more than chance, and mostly: it slows down for all of a short hold."""
+def _goes_on(values: Array, hold: Ints, comes: Array) -> bool:
+    """Whether the second differences of values (n,) go by the way that their holds were come to, by
+    more than chance, and mostly: what slows down for all of a short hold does."""
     each, which = _second(values, hold)
     if len(each) < ENOUGH:
         return False
     first = first_rows(hold)
-    came = np.sign(np.diff(values[first], prepend=values[0]))
-    against = -each * came[np.searchsorted(hold[first], which)]
-    rms = float(np.sqrt(np.mean(against**2)))
-    return bool(against.mean() > rms * max(_SURELY / len(each) ** 0.5, _MOSTLY))
+    came = np.sign(np.diff(comes[first], prepend=comes[0]))
+    along = each * came[np.searchsorted(hold[first], which)]
+    rms = float(np.sqrt(np.mean(along**2)))
+    return bool(abs(along.mean()) > rms * max(_SURELY / len(each) ** 0.5, _MOSTLY))
 
 
 _FOUR = 4  # samples that a second difference needs, and one before
