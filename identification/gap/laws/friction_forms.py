@@ -4,6 +4,7 @@ loads, or that wears the holes of what gives way."""
 from __future__ import annotations
 
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -67,26 +68,27 @@ def spectrum_root(count: int) -> Array:
 
 
 def growing(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
-    """Exponential laws, part of whose friction grows in proportion to what the gear carries, push
-    and weights together: teeth and bearings rub the more the harder they are pressed (Bittencourt
-    and Gunnarsson, J. Dyn. Syst. Meas. Control 134, 2012)."""
+    """Exponential laws of neighbouring reaches, part of whose friction grows in proportion to what
+    the gear carries, push and weights together: teeth and bearings rub the more the harder they are
+    pressed (Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134, 2012)."""
     torque, unit = bench.true_torque[:, joint], -bench.sense * bench.compliance[joint]
     carries = np.abs(torque + bench.weight(joint))
     top, out = float(carries.max()), []
-    reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
+    reach = bench.reach_of(torque) * np.array(GROWS_OVER)
     for law in friction_law.exponential_laws(bench):
         held = reach * path.bristles(reach, law.startswith("Bouc-Wen"))
         slips = torque[:, None] if law in SLIPPING else 0.0
         both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
-        for r, states in zip(reach, both, strict=True):
-            columns = [bench.add_joint(joint, unit * h) for h in states]
-            label, prior = f"{name} {law} {r:.3g} Nm grows", 0.25 / (4 * _GROWING)
-            radius = np.array([r, r])
-            out.append(shape(label, joint, columns, radius, law, prior=prior, grows_to=top))
+        each = [[bench.add_joint(joint, unit * h) for h in states] for states in both]
+        for (r, first), (s, second) in pairwise(zip(reach, each, strict=True)):
+            label, radius = f"{name} {law} {r:.3g} Nm grows", np.array([r, r, s, s])
+            facts = {"prior": 0.25 / (4 * (len(reach) - 1)), "grows_to": top}
+            out.append(shape(label, joint, [*first, *second], radius, law, **facts))
     return out
 
 
-_GROWING = 6  # reaches
+# Of the joint's range of torque: bearings stick over far less than what bends with the gear.
+GROWS_OVER = (0.01, 0.02, 0.04, 0.08, 0.2, 0.5, 1.2)
 
 
 def saturating(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:

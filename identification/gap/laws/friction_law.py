@@ -68,8 +68,11 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     terms = tuple(
         Term("compliance", {k: float(r)}) for k, r in zip(keys, v.info["radius"], strict=True)
     )
-    if "grows_to" in v.info:
-        terms = terms[0], Term("compliance", {**terms[1].shape, "grows_to": v.info["grows_to"]})
+    if "grows_to" in v.info:  # every other one
+        grown = {"grows_to": v.info["grows_to"]}
+        terms = tuple(
+            replace(t, shape={**t.shape, **grown}) if i % 2 else t for i, t in enumerate(terms)
+        )
     terms += (Term("compliance"),) if v.other_springs else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
 
