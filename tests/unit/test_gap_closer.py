@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
@@ -117,9 +118,30 @@ def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
     for v in finer:
         assert (v.info["joint"], v.info["memory"]) == (1, memory)
         own = bench.joint_column(1, bench.elastic[:, 1])[:n] * (v.info["law"] in SLIPPING)
-        same, grows = (bench.columns[c][:n] - own for c in v.columns)
-        np.testing.assert_allclose(grows, same * net / net.max(), atol=1e-12 * np.abs(same).max())
+        each = [bench.columns[c][:n] - own for c in v.columns]
+        for same, grows in (each[:2], each[2:]):
+            size = 1e-12 * np.abs(same).max()
+            np.testing.assert_allclose(grows, same * net / net.max(), atol=size)
     assert joint_hysteresis.further(bench_without_arm(), found) == []
+
+
+@pytest.mark.parametrize("reach", [0.015, 0.03, 0.3])
+def test_friction_that_grows_sticks_over_short_reaches_as_over_long_ones(reach: float) -> None:
+    """As bearings do: of the joint's range of torque."""
+    bench = make_bench(arm_data())
+    grid = library(bench, ["joint_hysteresis"])
+    found = next(v for v in grid if v.info["joint"] == 1)
+    torque, net = bench.true_torque[:, 1], bench.true_torque[:, 1] + bench.weight(1)
+    span = bench.reach_of(torque)
+    held = bench.path(torque).bristles(np.array([reach * span]), True)[:, 0] * np.abs(net)
+    rows = slice(0, bench.rows.n)
+    truth = bench.joint_column(1, -held)[rows]
+    misses = [
+        nnls(np.array([bench.columns[c][rows] for c in v.columns]).T, bench.sense * truth)[1]
+        for v in joint_hysteresis.further(bench, found)
+        if "grows_to" in v.info
+    ]
+    assert min(misses) < 0.05 * np.linalg.norm(truth)
 
 
 def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:
