@@ -274,7 +274,7 @@ def test_what_is_worth_too_little_for_three_speaks_for_two_of_them() -> None:
 
 @pytest.mark.parametrize(("arm", "most"), [(True, DOUBT), (False, BENCH_DOUBT)])
 def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, most: float) -> None:
-    assert BENCH_DOUBT == 4 * DOUBT
+    assert BENCH_DOUBT > 4 * DOUBT
     bench = small_bench()
     variants = library(bench, ["joint_creep", "joint_hysteresis"])
     found = search(small_engine_of(bench), variants)
