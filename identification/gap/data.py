@@ -147,6 +147,7 @@ class GapData:
     lets_go: bool = False
     on_the_way: Flags | None = None
     onward: Array | None = None
+    force_scatters: float = 1.0
     aside: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 

@@ -30,6 +30,7 @@ from identification.gap.recording.ends import without_ends
 from identification.gap.recording.glitches import without_glitches
 from identification.gap.recording.ramps import ramps_told
 from identification.gap.recording.slack import without_slack
+from identification.gap.recording.trembling import force_as_it_scatters
 from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
@@ -74,7 +75,8 @@ def explain_gap(
     withheld, forced = set(withhold), frozenset(add)
     check_words(withheld | forced)
     tell("preparing", 0.0)
-    bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
+    told = force_as_it_scatters(ramps_told(data))
+    bench = make_bench(without_slack(without_glitches(without_ends(told))))
     engine, variants = _prepared(bench, known, withheld)
     _check_shown(forced, variants)
     tell("comparing effects", 0.2)

@@ -52,6 +52,12 @@ def _faults(bench: Bench) -> Iterator[str]:
             "scatter. See whether they were connected."
         )
     yield from (f.text for f in bench.course.faults)
+    if bench.data.force_scatters > NOISY:
+        yield (
+            f"The force scatters {bench.data.force_scatters:.0f} times as much as stated while the "
+            "displacement stands still: an uncertainty that was judged too small, or hum. It was "
+            "taken as uncertain as it is."
+        )
     if bench.noise.raised > NOISY:
         yield (
             f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "

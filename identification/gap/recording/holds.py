@@ -137,18 +137,36 @@ def _second(values: Array, hold: Ints) -> tuple[Array, Ints]:
     return np.asarray(second[same] / 6**0.5), hold[3:][same]
 
 
+def in_common(values: Array, others: Array, hold: Ints) -> tuple[float, float]:
+    """Size of the mean product of what two channels (n,) scatter in holds, and its standard error;
+    0 where there are too few."""
+    ours, theirs = (_second(v, hold)[0] for v in (values, others))
+    if len(ours) < ENOUGH:
+        ours, theirs = (_of_three(v, hold)[0] for v in (values, others))
+    if len(ours) < ENOUGH:
+        return 0.0, 0.0
+    product = ours * theirs
+    return abs(float(product.mean())), float(product.std()) / float(len(product) ** 0.5)
+
+
 def scatter_of_three(values: Array, hold: Ints) -> float | None:
     """The same of holds that are too short for that, from their last two readings: None where these
     go on the way that the hold was come to, or there are too few."""
-    first = first_rows(hold)
-    count = np.diff(np.append(first, len(hold)))
-    last = (first + count - 1)[count == _THREE]
-    came = np.sign(np.diff(values[first], prepend=values[0]))[count == _THREE]
-    step = values[last] - values[last - 1]
+    step, came = _of_three(values, hold)
     onward = step * came
     if abs(onward.sum()) > _ONWARD * float(np.sqrt(onward @ onward)):
         return None
-    return _trimmed(step / 2**0.5)
+    return _trimmed(step)
+
+
+def _of_three(values: Array, hold: Ints) -> tuple[Array, Array]:
+    """(k,) steps between the last two readings of holds of three, as large as the values scatter;
+    (k,) the sense in which these holds were come to."""
+    first = first_rows(hold)
+    three = np.diff(np.append(first, len(hold))) == _THREE
+    came = np.sign(np.diff(values[first], prepend=values[0]))
+    last = first[three] + _THREE - 1
+    return (values[last] - values[last - 1]) / 2**0.5, came[three]
 
 
 _THREE = 3
