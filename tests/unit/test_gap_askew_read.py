@@ -111,3 +111,39 @@ def test_the_cost_is_paid_beside_another_effect_whichever_comes_first() -> None:
         return explain(engine, parts, marginal(scored), energy).log_weight
 
     assert weight(askew, springs) == pytest.approx(weight(springs, askew), abs=1.0)
+
+
+@pytest.mark.parametrize("softer", [0.92, 1.08])
+def test_a_tangent_is_known_as_well_as_the_springs_that_it_is_seen_through(softer: float) -> None:
+    """Pushed along x, joint 1 is turned by what goes across alone: the softer it is, the further,
+    and the dynamometer knows that only as well as it keeps its axes apart."""
+    data = only_first_setup(arm_data())
+    (setup,) = data.setups
+    push = np.array([0.07, -0.04])
+    true = data.compliance * np.array([softer, *np.ones(data.joints - 1)])
+    torque = data.force[:, None] * (setup.lever + push @ setup.tangent_lever)
+    rng = np.random.default_rng(5)
+    found = explained(
+        replace(
+            data,
+            displacement=torque * true @ setup.lever + rng.normal(0, NOISE_M, len(torque)),
+            q=true * torque + rng.normal(0, 5e-6, torque.shape),
+            tangential=push * data.force[:, None] + rng.normal(0, NOISE_N, (len(torque), 2)),
+        )
+    )
+    assert found.verdict == "load_misalignment"
+    parameters = found.effects[0].parameters
+    for name, truth in zip(("tangent_x_1", "tangent_x_2"), push.tolist(), strict=True):
+        assert parameters[name].low < truth < parameters[name].high
+
+
+def only_first_setup(data: GapData) -> GapData:
+    mine = data.setup == 0
+    names = ("time", "run", "setup", "repetition", "branch", "step", "force", "displacement")
+    session = None if data.session is None else data.session[mine]
+    return replace(
+        data,
+        setups=data.setups[:1],
+        session=session,
+        **{name: getattr(data, name)[mine] for name in names},
+    )

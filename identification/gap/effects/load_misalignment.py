@@ -35,7 +35,7 @@ from identification.gap.laws.across_law import (
 )
 from identification.gap.laws.closer import best_about_springs
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Coefficients, Parameter, normal
+from identification.gap.laws.interval import Coefficients, Parameter, Softer, normal
 from identification.gap.laws.law import Laws
 from identification.gap.model.base import CROSSTALK, MOST_CROSSTALK
 from identification.gap.model.bench import Bench
@@ -248,7 +248,8 @@ def _given(bench: Bench, names: list[str], each: tuple[_Known, ...]) -> list[int
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Tangents at the largest load, as it was come to; of single runs their mean; of the force
-    across as it was read that of the readings themselves."""
+    across as it was read that of the readings themselves. What an arm gives way under them is known
+    as well as the springs that they go through."""
     info = v.info
     if info.get("as_read"):
         return _tangents_read(bench)
@@ -257,11 +258,30 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
         names = [f"{name}_{pose}" for name, pose in zip(names, info["poses"], strict=True)]
     common = np.eye(2 * len(names) * count, len(found.w))
     rows = common.reshape(len(names), count, 2, -1).sum(axis=1)
-    return {
-        f"tangent_{name}_{k + 1}": found.linear(rows[i, k], "1")
-        for i, name in enumerate(names)
-        for k in range(2)
-    }
+    out = {}
+    for i, (name, direction) in enumerate(zip(names, info["directions"], strict=True)):
+        for k in range(2):
+            p = found.linear(rows[i, k], "1")
+            square = p.value**2 * _unsure(bench, direction, k, found.softer)
+            out[f"tangent_{name}_{k + 1}"] = normal(p.value, p.sd**2 + square, "1")
+    return out
+
+
+def _unsure(bench: Bench, direction: str, k: int, softer: Softer) -> float:
+    """Relative variance of what a force along tangent k of a direction does, by the springs that it
+    goes through, as far as displacement and joint readings tell of each."""
+    noise = bench.noise
+    reads = 1 / float(np.hypot(np.median(noise.q), noise.q_run)) if bench.has_q else 0.0
+    tells = np.zeros(bench.data.joints)
+    for s in bench.data.setups:
+        if s.direction == direction:
+            turns = s.tangent_lever[k] * bench.compliance  # rad/N
+            tells += turns**2 * ((s.lever / noise.stated) ** 2 + reads**2)
+    share = tells / max(float(tells.sum()), _TINY)
+    return sum(float(share[j]) ** 2 * v for j, v in softer.variance.items() if j < len(share))
+
+
+_TINY = 1e-300
 
 
 def _tangents_read(bench: Bench) -> dict[str, Parameter]:
