@@ -71,6 +71,25 @@ def test_an_interval_holds_all_that_fits_alike_at_whatever_joint(other: int) -> 
     assert found.high > 60.0
 
 
+@pytest.mark.parametrize(("nats", "open_"), [(0.0, True), (8.0, True), (40.0, False)])
+def test_an_interval_holds_shapes_that_are_some_nats_less_likely(nats: float, open_: bool) -> None:
+    """Four nats count as one; the likelier shape still says more."""
+    bench = small_bench()
+    common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "joint": 0}
+    low, high = (
+        Variant(
+            *("joint_yield", f"at {c}", (0,), (1.0,), np.eye(1)),
+            info={**common, "centre": c},
+            prior=prior,
+        )
+        for c, prior in ((30.0, 0.5), (60.0, 0.5 * np.exp(-nats)))
+    )
+    chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = known_of(small_engine(bench), [low, high], chosen)[0].parameters["threshold"]
+    assert (found.high > 50.0) is open_
+    assert found.ci90[0] < 30.0 < found.ci90[1]
+
+
 def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     """However much it moves with what stands beside it; nor beyond the largest load."""
     bench = small_bench()

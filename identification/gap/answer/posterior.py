@@ -39,6 +39,10 @@ class Known(NamedTuple):
 
 
 _MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of the posterior
+# So many nats between the shapes of a family count as one: that one of them comes closest to the
+# true law says little of where the true law puts a width or a depth. Of 139 parameters of a blind
+# run 115 lay in intervals that counted each nat, 121 in these, which are a fifth wider.
+LEFT_OPEN = 4.0
 
 
 def settled(
@@ -101,11 +105,11 @@ class _Shapes:
     ) -> None:
         self.engine, self.chosen, self.index = engine, chosen, index
         self.every = _open(engine, variants, chosen, index)
-        least = max(weight for _, weight in self.every) + np.log(_LEAST_SHARE)
+        least = max(weight for _, weight in self.every) + LEFT_OPEN * np.log(_LEAST_SHARE)
         self.open = [e for i, e in enumerate(self.every) if e[1] > least or i == 0]
         self.read = [_read(engine, explanation) for explanation, _ in self.open]
         weights = np.array([weight for _, weight in self.open])
-        self.share = np.exp(weights - weights.max())
+        self.share = np.exp((weights - weights.max()) / LEFT_OPEN)
 
     def own(self, said: Parameters) -> Parameters:
         """Parameters of the effect, the others as they are; said: of the explanation itself."""
