@@ -55,7 +55,6 @@ DRIFTS = words_of("drift")
 DATUM_JUMPS = frozenset({"zero_shift"})  # shows without load, and at once
 BETWEEN_RUNS = DRIFTS | DATUM_JUMPS  # what one run does so, no other run foretells
 SPRINGS = "joint_stiffness_error"  # the linear law of the joints' springs, which mechanisms share
-YIELD = "joint_yield"  # gives way for good, as friction does without coming back
 LATE = frozenset({"joint_creep", "time_lag"})  # what comes after the load
 
 # Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.

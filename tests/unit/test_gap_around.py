@@ -65,7 +65,7 @@ def test_of_springs_beside_a_mechanism_the_better_ones_are_taken(
 
     monkeypatch.setattr("identification.gap.search.search.score", lambda *_: springs)
     monkeypatch.setattr("identification.gap.search.search.up_to_likeliest", lambda *_: ([], 0.0))
-    monkeypatch.setattr("identification.gap.search.search.explain", explained)
+    monkeypatch.setattr("identification.gap.explanations.explanation.explain", explained)
     start = said((part("joint_backlash", [0], joints=[0]),), (1e-5,))
     (found,) = _with_one_more(small_engine(small_bench()), [], start, {}).values()
     assert found.parts[1].variant is springs[taken].variant

@@ -19,7 +19,7 @@ from identification.gap.evidence.engine import (
     level_covariance,
     run_columns,
 )
-from identification.gap.evidence.imperfection import LOG_STEP, level_prior, log_share
+from identification.gap.evidence.imperfection import LOG_STEP, level_priors, log_share
 from identification.gap.evidence.parts import (
     Part,
     evidence_correction,
@@ -243,7 +243,7 @@ def test_levels_of_imperfection_are_bins_about_them(step: float) -> None:
     for i in (1, 2, 3):
         edges = np.log(etas[i]) + np.array([-half, half])
         alone = float(log_share(etas, edges, (3e-6 / 0.04) ** 2)[0])
-        assert level_prior(etas, i, (3e-6 / 0.04) ** 2) == pytest.approx(alone, abs=1e-9)
+        assert level_priors(etas, (3e-6 / 0.04) ** 2)[i] == pytest.approx(alone, abs=1e-9)
 
 
 def test_fit_and_evidence_take_one_imperfection_of_a_hold() -> None:

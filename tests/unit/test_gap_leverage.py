@@ -105,17 +105,15 @@ def test_every_part_is_polished_whatever_order_better_ones_stand_in(
         asked.append(word)
         return word
 
-    def better(_: Any, parts: tuple[Any, ...], __: Any, ___: Any) -> Any:
-        return SimpleNamespace(parts=parts[::-1], log_weight=float(len(asked)))
+    def better(_: Any, rest: tuple[Any, ...], word: str, *__: Any) -> Any:
+        parts = SimpleNamespace(word=word), *rest[::-1]
+        return SimpleNamespace(parts=parts, log_weight=float(len(asked)))
 
     for name, does in {
         "up_to_likeliest": lambda *_: ([], 0.0),
         "family_of": family,
-        "score": lambda engine, levels, word, energy: [SimpleNamespace(variant=word, scale=1.0)],
-        "closest": lambda scored: scored[0],
-        "marginal": lambda scored: 0.0,
-        "Part": lambda variant, scale: SimpleNamespace(word=variant),
-        "explain": better,
+        "score": lambda engine, levels, word, energy: word,
+        "joined": better,
     }.items():
         monkeypatch.setattr(several, name, does)
     start: Any = SimpleNamespace(

@@ -108,4 +108,5 @@ def test_a_specimen_that_is_driven_to_and_fro_may_slip_at_one_strength() -> None
 def test_no_strength_no_limit() -> None:
     bench, torque, _ = arm()
     row = no_knee(bench, torque, np.zeros(0), bench.path(torque))
-    assert row is None or row.shape == (1, 0)
+    assert row is not None
+    assert row.shape == (1, 0)

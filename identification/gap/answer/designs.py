@@ -15,6 +15,7 @@ import numpy as np
 from identification.gap.data import LOADING, UNLOADING, ZERO, GapData, Instruments, Setup
 from identification.gap.model.bench import Bench
 from identification.gap.recording.rows import REST_S
+from identification.running import stretches
 from identification.times import MOUNT_S, SCREW_S, SETTLE_S, UNLOAD_S
 
 APPROACH_S = SCREW_S + SETTLE_S  # of a level
@@ -181,13 +182,12 @@ def planned(design: Design, bench: Bench) -> GapData:
     setup, repetition = setup.astype(whole), repetition.astype(whole)
     lever = np.stack([s.lever for s in design.setups])[setup]
     outside = np.array([s.outside for s in design.setups])[setup]
-    new = np.append(True, (np.diff(setup) != 0) | (np.diff(repetition) != 0))
     return replace(
         data,
         setups=design.setups,
         time=time,
         session=session,
-        run=np.cumsum(new).astype(whole) - 1,
+        run=stretches(setup, repetition),
         setup=setup,
         repetition=repetition,
         branch=branch.astype(whole),

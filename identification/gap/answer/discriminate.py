@@ -269,8 +269,7 @@ def _with_noise(bench: Bench, there: Bench) -> Bench:
 
 def _spring_changes(there: Bench, rival: Rival) -> Array:
     out = np.zeros(there.layout.size)
-    for name, change in rival.springs.items():
-        j = int(name.removeprefix("spring")) - 1
+    for j, change in enumerate(rival.springs):
         out += change * there.joint_column(j, there.elastic[:, j])
     return out
 

@@ -317,13 +317,7 @@ def _size(engine: Engine, i: int, energy: float) -> float:
 
 def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
     """The springs beside an effect, with what their uncertainty has in common with it."""
-    base, before = len(fitted.base), sum(len(p.variant.columns) for p in fitted.parts[:index])
-    start = base + before
-    mine = slice(start, start + len(fitted.parts[index].variant.columns))
-    covariance = fitted.joint_covariance
-    at = {
-        int(engine.base.names[i].removeprefix("spring")) - 1: i for i in engine.base.index("spring")
-    }
+    mine, covariance, at = fitted.among_all(index), fitted.joint_covariance, engine.base.springs
     return Softer(
         {j: float(fitted.base[i]) for j, i in at.items()},
         {j: float(covariance[i, i]) for j, i in at.items()},

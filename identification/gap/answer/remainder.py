@@ -2,7 +2,7 @@
 
 The residual of a fit is read as `r = g(setup, branch, force) + noise`, with g a Gaussian process
 over levels of load: alike for neighbouring loads of one setup, half so between branches (as
-`engine.alike` has it), of unknown size eta; or g is at one level alone, as where a law cuts a
+`evidence.alike` has it), of unknown size eta; or g is at one level alone, as where a law cuts a
 corner. Noise is that of the instruments, and what visits of a level scatter beyond that. Everything
 is Gaussian for a given eta, so the posterior of g is exact (Rasmussen and Williams, Gaussian
 Processes for Machine Learning, 2006, eq. 2.23-2.24), and eta is integrated over a grid. No claim
@@ -21,6 +21,7 @@ from identification.gap.evidence.alike import alike
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import Fit
 from identification.gap.model.bench import Bench
+from identification.gap.recording.rows import classes, ids
 
 _TURN = 0.02
 _CLASSES = 24  # of the load of a running recording, per sense of motion
@@ -139,11 +140,7 @@ def _level_ids(bench: Bench, branch: Ints) -> Ints:
     rows = bench.rows
     if not rows.continuous:
         return rows.level
-    span = float(np.ptp(bench.load)) or 1.0
-    share = (bench.load - bench.load.min()) / span
-    number = np.minimum(share * _CLASSES, _CLASSES - 1).astype(np.int64)
-    keys = np.column_stack([rows.setup, branch, number])
-    return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    return ids(np.column_stack([rows.setup, branch, classes(bench.load, _CLASSES)]))
 
 
 def _levels(

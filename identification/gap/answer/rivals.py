@@ -15,7 +15,7 @@ from identification.gap.evidence.compare import Scored, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult, conditioned
-from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.fit import fit
 from identification.gap.laws.law import Law
 from identification.gap.model.variants import Variant
 
@@ -25,7 +25,7 @@ _WITHIN = 12.0  # nats below the best that a shape may lie
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """One of the two words: the forms that were fitted with it, changes of the springs by name,
+    """One of the two words: the forms that were fitted with it, changes (m,) of the springs,
     and shapes that the first of them may take, with their weights on the present data (log) and
     units. further: of the word's other forms (it may sit in several joints), which every shape has
     beside it, the part, law and unit. rest: forms of the other words beside it, as far as they
@@ -33,7 +33,7 @@ class Rival:
 
     word: str
     forms: tuple[Form, ...]
-    springs: dict[str, float]
+    springs: Array
     shapes: tuple[tuple[Variant, Law, Array, float], ...]
     further: tuple[tuple[Part, Law, Array], ...] = ()
     rest: tuple[Form, ...] = ()
@@ -55,7 +55,7 @@ def rival_of(found: SearchResult, chosen: Explanation, first: str, word: str) ->
     return Rival(
         word,
         tuple(lawful(f) for f in described if f.word == word),
-        _springs(engine, fitted),
+        engine.base.softer(fitted.base, engine.bench.data.joints),
         _shapes(engine, [v for v in found.variants if v.word == word], part, beside),
         tuple((p, *law_of(engine.bench, p.variant)) for p in others),
         tuple(lasting(f) for f in described if f.word != word),
@@ -86,11 +86,6 @@ def same_elsewhere(
     )
     forms = tuple(twin.form(f) for f in first.forms)
     return replace(first, word=word, forms=forms, shapes=shapes, further=further)
-
-
-def _springs(engine: Engine, fitted: Fit) -> dict[str, float]:
-    names = engine.base.names
-    return {n: float(b) for n, b in zip(names, fitted.base, strict=True) if n.startswith("spring")}
 
 
 def _shapes(

@@ -26,15 +26,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
 
 WORD = "base_compliance"
-DEPTHS_M = (
-    0.0,
-    0.15,
-    0.3,
-    0.45,
-    0.6,
-    0.8,
-    1.0,
-)  # of tilt axes below the base: flange, table, floor
+DEPTHS_M = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0)  # of tilt axes: flange, table, floor
 COUPLED = 0.6  # sd of what couples two axes, against that of their own compliances
 SCALES = (3e-7, 1e-6, 3e-6, 1e-5)  # rad/Nm
 # Of the largest moment: where feet stiffen, or bolts let go.

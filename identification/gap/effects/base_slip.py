@@ -21,7 +21,7 @@ from identification.gap.effects.base_compliance import moments
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.interval import Coefficients, Parameter
+from identification.gap.laws.interval import Parameter
 from identification.gap.laws.knees import knee_at, knee_variants
 from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
 from identification.gap.laws.law import Law, Laws
@@ -114,10 +114,6 @@ def _name(info: dict[str, Any]) -> str:
     return f"axis {info['axis']} {info['depth_m']:g} m below"
 
 
-def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
-    return of_knee(bench, v, found, _named)
-
-
 def _named(bench: Bench, v: Variant, threshold: Parameter) -> dict[str, Parameter]:
     """Of a stand that slides the force across at which it does; of a slip about a lying axis, with
     what is not known of its depth."""
@@ -158,7 +154,7 @@ def _flow(bench: Bench, law: Law) -> Flow:
 EFFECT = Effect(
     WORD,
     variants=variants,
-    parameters=_parameters,
+    parameters=partial(of_knee, named=_named),
     laws=Laws(_describe, _columns, flow=_flow),
     lengths=("slope_beyond_over_elastic",),
     finer=partial(knees_closer.finer, between=between),

@@ -16,7 +16,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.gains import BENDS, SCALES, factor, law_of_gain, scales, weighed
+from identification.gap.laws.gains import SCALES, factor, law_of_gain, straight_and_bent, weighed
 from identification.gap.laws.law import Law, Laws
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -28,24 +28,10 @@ CHANGES_AT = (0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85)
 
 def variants(bench: Bench) -> list[Variant]:
     """The gain of the displacement minus one, alone; and with what it has more at full range."""
-    line = bench.line
-    top = float(np.abs(line).max())
-    straight = bench.add(bench.outside_column(line))
-    out = [variant(WORD, "gain", [straight], scales(bench), positive=False)]
-    if bench.data.arm and top > 0:  # one spring's curve would be the same
-        bend = bench.add(bench.outside_column(line * np.abs(line) / top))
-        out.append(
-            variant(
-                WORD,
-                "gain that bends",
-                [straight, bend],
-                SCALES,
-                root=BENDS,
-                positive=False,
-                prior=0.5,
-                full=top,
-            )
-        )
+    line, top = bench.line, float(np.abs(bench.line).max())
+    out = straight_and_bent(bench, WORD, line, lambda read: bench.add(bench.outside_column(read)))
+    if bench.data.arm and top > 0:
+        straight = out[0].columns[0]
         out += [_of_two_ranges(bench, straight, share, top) for share in CHANGES_AT]
     return out
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.gains import BENDS, SCALES, factor, law_of_gain, scales, weighed
+from identification.gap.laws.gains import SCALES, factor, law_of_gain, straight_and_bent, weighed
 from identification.gap.laws.law import Law, Laws
 from identification.gap.model.base import component, shown
 from identification.gap.model.bench import Bench
@@ -27,23 +27,7 @@ WORD = "force_scale"
 
 def variants(bench: Bench) -> list[Variant]:
     """The gain of the force minus one, alone; and with what it has more at full range."""
-    top = float(np.abs(bench.load).max())
-    straight = bench.add(shown(bench, bench.load))
-    out = [variant(WORD, "gain", [straight], scales(bench), positive=False)]
-    if bench.data.arm and top > 0:  # one spring's curve would be the same
-        bend = bench.add(shown(bench, bench.load * np.abs(bench.load) / top))
-        out.append(
-            variant(
-                WORD,
-                "gain that bends",
-                [straight, bend],
-                SCALES,
-                root=BENDS,
-                positive=False,
-                prior=0.5,
-                full=top,
-            )
-        )
+    out = straight_and_bent(bench, WORD, bench.load, lambda read: bench.add(shown(bench, read)))
     return out + [_of_one(bench, axis) for axis in _loaded(bench)]
 
 

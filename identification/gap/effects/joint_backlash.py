@@ -46,6 +46,7 @@ from identification.gap.laws.lost_motion import (
     UNEVEN,
     Play,
     crosses,
+    free_places,
     less_rub,
     net,
     resting_columns,
@@ -341,15 +342,10 @@ _SOFTER = 2.5  # times
 def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:
     """Columns per setup: unloaded rows of its first run, and of later ones, in which the joint is
     loose. Zones that agree on these rows share their columns."""
-    rows, key = bench.rows, loose.tobytes()
+    key = loose.tobytes()
     if key not in places:
-        places[key] = []
-        for s in range(len(bench.data.setups)):
-            mine = rows.setup == s
-            first = rows.run == rows.run[mine].min()
-            for place in (mine & first & loose, mine & ~first & loose):
-                if place.any() and not np.all(loose[mine]):
-                    places[key].append(bench.add_joint(joint, place.astype(float)))
+        free = free_places(bench, loose)
+        places[key] = [bench.add_joint(joint, place.astype(float)) for *_, place in free]
     return places[key]
 
 

@@ -19,6 +19,7 @@ Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manu
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flow_back import flowing_back
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.interval import Coefficients, Parameter
+from identification.gap.laws.interval import Parameter
 from identification.gap.laws.knees import (
     THRESHOLDS,
     fresh_of,
@@ -114,10 +115,6 @@ def _under_weight(
 _PUSHED = 0.2  # of the joint's largest torque: so far beyond its weight some push must go
 
 
-def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
-    return of_knee(bench, v, found, _named)
-
-
 def _named(bench: Bench, v: Variant, found: Parameter) -> dict[str, Parameter]:
     """The threshold as net torque and as what the push brings, where weights make them two: for
     the sense, and in the setups, of the largest push."""
@@ -169,7 +166,7 @@ def _flow(bench: Bench, law: Law) -> Flow:
 EFFECT = Effect(
     WORD,
     variants=variants,
-    parameters=_parameters,
+    parameters=partial(of_knee, named=_named),
     laws=Laws(_describe, _columns, flow=_flow),
     lengths=("slope_beyond_over_elastic",),
     finer=knees_closer.finer,

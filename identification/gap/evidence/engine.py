@@ -32,7 +32,7 @@ from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
 from identification.gap.model.growing import Growing
 from identification.gap.recording.rows import Rows
-from identification.running import first_rows
+from identification.running import first_rows, stretches
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 _CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
@@ -88,12 +88,10 @@ class Engine:
         self._length_q = 1 / self.sigma[bench.layout.q]
         run = bench.rows.run[self._edges]
         self._runs = first_rows(run)
-        self._run = np.repeat(np.arange(len(self._runs)), np.diff(np.append(self._runs, len(run))))
+        self._run = stretches(run)
         self._along = self._of_mean()
-        counts = np.diff(np.append(self._edges, n))
-        self._hold = np.repeat(np.arange(len(self._edges)), counts)
-        self._alone = counts[self._hold] == 1
-        inside = np.flatnonzero(~self._alone)
+        self._hold = bench.rows.hold
+        inside = np.flatnonzero(np.bincount(self._hold)[self._hold] > 1)
         self._inside = inside[np.argsort(self.sigma[inside], kind="stable")]
         self._groups = _groups(self.sigma[self._inside])
         self._freedom = n - len(self._edges)

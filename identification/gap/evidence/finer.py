@@ -12,7 +12,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.evidence.compare import logsumexp
 from identification.gap.evidence.engine import Engine
-from identification.gap.evidence.imperfection import LOG_STEP, level_prior, log_share
+from identification.gap.evidence.imperfection import LOG_STEP, level_priors, log_share
 from identification.gap.evidence.parts import Part, log_joint_between, log_joints
 
 PARTS = 3  # of a step between levels
@@ -24,7 +24,7 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     the size of imperfection, is above what the levels give for it."""
     etas = engine.etas
     joint = log_joints(engine, parts)
-    coarse = joint + [level_prior(engine.etas, i, energy) for i in range(len(etas))]
+    coarse = joint + level_priors(etas, energy)
     best = int(coarse.argmax())
     last = min(max(best, 1) + 1, len(etas) - 1)
     lowest = np.log(etas[1]) - 2 * LOG_STEP if best <= 1 else np.log(etas[best - 1])

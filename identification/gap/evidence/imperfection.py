@@ -24,14 +24,10 @@ LOG_STEP = float(np.log(STEP))
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 
-def level_prior(etas: Array, i: int, energy: float) -> float:
-    """log prior of level i for an explanation of that mean square (m^2)."""
-    return float(log_level(etas, i, np.array(energy)))
-
-
-def level_priors(etas: Array, energy: Array) -> Array:
-    """log prior (l,) of every level; energy (l,): mean square (m^2) of the explanation at each."""
-    return log_level(etas, np.arange(len(etas)), energy)
+def level_priors(etas: Array, energy: Array | float) -> Array:
+    """log prior (l,) of every level; energy: mean square (m^2) of the explanation, or (l,) at
+    each."""
+    return log_level(etas, np.arange(len(etas)), np.asarray(energy))
 
 
 def log_level(etas: Array, i: int | Ints, energy: Array) -> Array:

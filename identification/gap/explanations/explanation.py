@@ -11,9 +11,9 @@ from math import log, nan
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.evidence.compare import condition
+from identification.gap.evidence.compare import Scored, closest, condition, marginal
 from identification.gap.evidence.engine import Engine, NoiseLevel
-from identification.gap.evidence.imperfection import level_prior, level_priors
+from identification.gap.evidence.imperfection import level_priors
 from identification.gap.evidence.parts import (
     Part,
     Sizes,
@@ -156,7 +156,7 @@ def explain(
     sizes = part_sizes(engine, parts, likeliest)
     each, energy = _ranking_sizes(engine, parts, sizes, likeliest), sizes.energy
     together = _together(parts, each)
-    logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
+    logs = bases + level_priors(engine.etas, energy)
     best = int(logs.argmax())
     remainder = may_remain(engine, together)
     least = max(
@@ -184,6 +184,20 @@ def explain(
         tuple(float(each[i]) for i in order),
         weight + log(max(fraction, 1e-300)),
     )
+
+
+def joined(
+    engine: Engine,
+    rest: tuple[Part, ...],
+    scored: Sequence[Scored],
+    energy: float,
+    charge: float = 0.0,
+) -> Explanation:
+    """The rest with the closest of a word's shapes, as they were scored beside it. energy: mean
+    square (m^2) that this took the rest to have; charge: nats against the word."""
+    top, taken = closest(scored), energy if rest else None
+    parts = (*rest, Part(top.variant, top.scale))
+    return explain(engine, parts, marginal(scored) - charge, taken)
 
 
 def may_remain(engine: Engine, troubles: Mapping[str, float]) -> float:

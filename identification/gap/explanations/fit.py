@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,19 +43,22 @@ class Fit:
 
     def pulls_of(self, index: int) -> Array:
         """`pulls` of one part."""
-        return self.pulls[len(self.base) :][self._where(index)]
+        return self.pulls[self.among_all(index)]
 
     def moved(self, engine: Engine, index: int, by: Array) -> Array:
         """(n,) m by which the fitted response moves where the coefficients of one part move by (k,)
         and all others follow as the data let them."""
-        start = len(self.base)
-        mine = self._where(index)
-        mine = slice(start + mine.start, start + mine.stop)
+        start, mine = len(self.base), self.among_all(index)
         pulled = np.linalg.pinv(self.joint_covariance[mine, mine], hermitian=True) @ by
         every = self.joint_covariance[:, mine] @ pulled
         columns = engine.columns(c for p in self.parts for c in p.variant.columns)
         moves = engine.base.columns @ every[:start] + columns @ every[start:]
         return np.asarray(moves[: engine.bench.rows.n])
+
+    def among_all(self, index: int) -> slice:
+        """Where the coefficients of one part are among those of base and effects."""
+        start, mine = len(self.base), self._where(index)
+        return slice(start + mine.start, start + mine.stop)
 
     def _where(self, index: int) -> slice:
         start = sum(len(p.variant.columns) for p in self.parts[:index])
@@ -80,6 +84,12 @@ class Fit:
         missed = (engine.target - gives)[q].reshape(bench.data.joints, -1)
         noise = engine.sigma[q].reshape(missed.shape)
         return missed, np.hypot(noise, bench.noise.q_run)
+
+    def together(self, engine: Engine, words: Collection[str]) -> Array:
+        """(n,) m what the effects of these words do to the response."""
+        n = engine.bench.rows.n
+        mine = [i for i, p in enumerate(self.parts) if p.word in words]
+        return sum((self.contribution(engine, i)[:n] for i in mine), np.zeros(n))
 
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""
@@ -153,7 +163,7 @@ def _phases(engine: Engine) -> list[Flags]:
     if rows.continuous:
         up = rises(np.abs(bench.load))
         return [up, ~up]
-    first = rows.edges[np.cumsum(rows.hold_starts) - 1]
+    first = rows.edges[rows.hold]
     place = np.minimum(np.arange(rows.n) - first, _LATER)
     up = np.abs(bench.load[first]) >= np.abs(bench.load[np.maximum(first - 1, 0)])
     masks = [(place == k) & way for k in range(_LATER + 1) for way in (up, ~up)]

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from identification.gap.evidence.compare import closest, marginal, score
+from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import Explanation, explain, up_to_likeliest
+from identification.gap.explanations.explanation import Explanation, joined, up_to_likeliest
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.gap.words import IN_JOINTS
@@ -64,9 +64,7 @@ def _in_one_more(
         return None
     levels, energy = up_to_likeliest(engine, start.parts)
     scored = score(engine, levels, others, energy)
-    top = closest(scored)
-    parts = (*start.parts, Part(top.variant, top.scale))
-    found = explain(engine, parts, marginal(scored) - WORTH, energy)
+    found = joined(engine, start.parts, scored, energy, WORTH)
     if found.log_weight < start.log_weight - _HOPELESS:
         return None
     return polished(engine, variants, found)
@@ -79,10 +77,8 @@ def polished(engine: Engine, variants: Sequence[Variant], start: Explanation) ->
         rest, word = tuple(p for p in best.parts if p is not part), part.word
         levels, energy = up_to_likeliest(engine, rest)
         scored = score(engine, levels, family_of(variants, word, rest), energy)
-        top = closest(scored)
         again = WORTH * sum(p.word == word for p in rest)
-        parts = (*rest, Part(top.variant, top.scale))
-        found = explain(engine, parts, marginal(scored) - again, energy if rest else None)
+        found = joined(engine, rest, scored, energy, again)
         if found.log_weight > best.log_weight:
             best = found
     return best

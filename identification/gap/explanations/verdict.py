@@ -23,9 +23,7 @@ TEMPER = 0.12
 DOUBT, BENCH_DOUBT = 0.03, 0.2
 
 
-def trusted(
-    probabilities: dict[str, float], doubted: set[str], most: float = DOUBT
-) -> dict[str, float]:
+def trusted(probabilities: dict[str, float], doubted: set[str], most: float) -> dict[str, float]:
     """Probabilities in which a doubted word that is likelier than not gives up to `most` of its own
     away, the more the surer it is; half of that goes to `unknown`, half to all doubted words
     alike."""

@@ -156,9 +156,7 @@ def _own_tips(engine: Engine, explanation: Explanation, fitted: Fit) -> bool:
 
 def _moved(engine: Engine, fitted: Fit) -> float:
     """rms (m) of what the effects that are no linear laws move, at least the gap's structure."""
-    n = engine.bench.rows.n
-    bent = [i for i, p in enumerate(fitted.parts) if p.word not in LINEAR]
-    moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
+    moved = fitted.together(engine, {p.word for p in fitted.parts} - LINEAR)
     return max(engine.structural, engine.bench.rows.rms_about_means(moved))
 
 

@@ -23,12 +23,9 @@ from identification.gap.explanations.fit import Fit, fit
 def open_to_hands(engine: Engine, fitted: Fit) -> Array:
     """(n,) m by which the rows may be off because nobody saw the path that a lag repeats; 0 in a
     recording that runs on, which shows it."""
-    n = engine.bench.rows.n
     if engine.bench.rows.continuous:
-        return np.zeros(n)
-    late = [i for i, p in enumerate(fitted.parts) if p.word == time_lag.WORD]
-    moved = sum((fitted.contribution(engine, i)[:n] for i in late), np.zeros(n))
-    return np.asarray(PATH * np.abs(moved))
+        return np.zeros(engine.bench.rows.n)
+    return np.asarray(PATH * np.abs(fitted.together(engine, {time_lag.WORD})))
 
 
 def acts_by_hands_alone(found: SearchResult) -> bool:

@@ -146,9 +146,14 @@ def _told(engine: Engine, parts: list[Part], left: Array, rows: Flags) -> Array:
 def stated_prediction(engine: Engine) -> Array:
     """(n,) response that the simulation as stated predicts."""
     bench = engine.bench
-    known = 0.0 if bench.known is None else bench.known.does[: bench.rows.n]
-    curves = bench.simulated
-    return (bench.stated_slope * bench.load if curves is None else curves) + known
+    return simulated_line(bench) + (
+        0.0 if bench.known is None else bench.known.does[: bench.rows.n]
+    )
+
+
+def simulated_line(bench: Bench) -> Array:
+    """(n,) m the response that was simulated: by a spring, or by another simulator."""
+    return bench.stated_slope * bench.load if bench.simulated is None else bench.simulated
 
 
 def _stacked_keep(engine: Engine, out: Flags) -> Flags:

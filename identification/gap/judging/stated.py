@@ -19,17 +19,17 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.evidence.compare import closest, marginal, score
+from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
-from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import (
     Explanation,
     SearchResult,
-    explain,
+    joined,
     up_to_likeliest,
 )
-from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.fit import fit
 from identification.gap.judging.dead_zone import where_it_sits
+from identification.gap.judging.heldout import simulated_line
 from identification.gap.laws.specimens import without_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
@@ -101,9 +101,7 @@ def _beside(
         return heir
     levels, energy = up_to_likeliest(engine, heir.parts)
     scored = score(engine, levels, shapes, energy)
-    top = closest(scored)
-    parts = (*heir.parts, Part(top.variant, top.scale))
-    both = _led(engine, explain(engine, parts, marginal(scored), energy))
+    both = _led(engine, joined(engine, heir.parts, scored, energy))
     first = both.parts[0].word in LINEAR
     return both if first and both.log_weight > heir.log_weight else heir
 
@@ -113,10 +111,11 @@ def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     bench, fitted = engine.bench, fit(engine, explanation)
     whole = fitted.beyond_known(engine)
     goes = MECHANISMS | LINEAR  # with the load, without a delay
-    paths = [whole - _of_others(engine, fitted, goes)]
-    if explanation.words & LATE:  # all that comes, and what comes at once
-        paths.append(whole - _of_others(engine, fitted, goes - LATE))
-    joint, line = explanation.parts[0].variant.joint, _line(bench)
+    words = explanation.words
+    paths = [whole - fitted.together(engine, words - goes)]
+    if words & LATE:  # all that comes, and what comes at once
+        paths.append(whole - fitted.together(engine, words - (goes - LATE)))
+    joint, line = explanation.parts[0].variant.joint, simulated_line(bench)
     mine = where_it_sits(bench, explanation)
     factor = _nearest(bench, mine, paths, joint)
     if factor is None:
@@ -125,18 +124,6 @@ def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
         bench.rows.rms_about_means(v * mine) for v in ((factor - 1) * line, whole - factor * line)
     )
     return Springs(off, rest) if off > _LEADS * rest else None
-
-
-def _line(bench: Bench) -> Array:
-    """(n,) m the response that was simulated: by a spring, or by another simulator."""
-    return bench.stated_slope * bench.load if bench.simulated is None else bench.simulated
-
-
-def _of_others(engine: Engine, fitted: Fit, words: frozenset[str]) -> Array:
-    """(n,) m what the effects but these words do."""
-    n = engine.bench.rows.n
-    others = [i for i, p in enumerate(fitted.parts) if p.word not in words]
-    return sum((fitted.contribution(engine, i)[:n] for i in others), np.zeros(n))
 
 
 def _nearest(
@@ -165,7 +152,7 @@ def _nearest(
 def _passed(bench: Bench, mine: Flags, response: Array) -> Array:
     """(k,) logarithms of the slopes that a response passes over the simulated one: of any two
     neighbouring pieces that are about as steep. A corner is no slope."""
-    line, out = _line(bench), [np.zeros(0)]
+    line, out = simulated_line(bench), [np.zeros(0)]
     spans = np.array([np.ptp(line[mine]), np.ptp(response[mine])])
     if not spans.min() > 0:
         return out[0]

@@ -125,7 +125,7 @@ def _springs_and_gains(engine: Engine, fitted: Fit) -> dict[str, float]:
     base, out = engine.base, {}
     free = {f"spring{j + 1}" for j in _springs_that_may(engine, fitted)}
     for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
-        if not name.startswith(("spring", "gain")) or name in free or not sd > 0:
+        if not name.startswith(("spring", "gain")) or name in free:
             continue
         whole = 1 + change if name.startswith("spring") else 1 - change
         out[name] = max(abs(change) / sd, abs(change / max(whole, _NEARLY_NONE)) / sd)

@@ -125,8 +125,7 @@ def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) ->
     levels, energy = conditioned(engine, beside)
     eta = engine.levels[score(engine, levels, [variant], energy)[0].level].eta
     fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))
-    found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
-    softer = np.array([found.get(f"spring{j + 1}", 0.0) for j in range(engine.bench.data.joints)])
+    softer = engine.base.softer(fitted.base, engine.bench.data.joints)
     return Estimate(fitted.of(0)[0], softer, float(eta))
 
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -172,13 +173,7 @@ def _gap(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, f
         f = flanks(p)
         return _left([_dead_zone(load - f.centre, f.zone, f.corner), rubs[:, k]], y, weight)
 
-    middle = float(load.min() + load.max()) / (2 * span)
-    starts = [
-        np.array([middle + c, np.log(h), np.log(r)])
-        for c in _CENTRES
-        for h in _HALVES
-        for r in _CORNERS
-    ]
+    starts = _starts(load, span, _HALVES, _CORNERS)
     best, _ = _descend(left, starts, np.array([0.03, 0.3, 0.7]), most)
     each = [left(best, k) for k in range(len(_FRICTIONS))]
     k = int(np.argmin(each))
@@ -238,15 +233,18 @@ def _with_friction(
     def left(p: Array) -> float:
         return _left([load, shapes(bench, load, flanks(p))[0]], bench.response, bench.rows.weight)
 
-    middle = float(load.min() + load.max()) / (2 * span)
-    starts = [
-        np.array([middle + c, np.log(w), np.log(o)])
-        for c in _CENTRES
-        for w in widths
-        for o in others
-    ]
+    starts = _starts(load, span, widths, others)
     best, rest = _descend(left, starts, np.array([0.03, step, 0.5]), most)
     return flanks(best), rest
+
+
+def _starts(
+    load: Array, span: float, widths: tuple[float, ...], others: tuple[float, ...]
+) -> list[Array]:
+    """Centres about the middle of the load, and logarithms of a width and of a second one."""
+    middle = float(load.min() + load.max()) / (2 * span)
+    each = product(_CENTRES, widths, others)
+    return [np.array([middle + c, np.log(w), np.log(o)]) for c, w, o in each]
 
 
 def _left(shapes: list[Array], y: Array, weight: Array) -> float:

@@ -10,14 +10,13 @@ Source: Bauschinger 1881; the plays are those of kinematic hardening (Prandtl 19
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array, Flags, Ints
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import beginnings
+from identification.gap.model.history import beginnings, whiles
 
 BACK = (0.1, 0.2, 0.3, 0.42, 0.56)  # radii of what flows back after a reversal, of the range
 RATCHET_FROM = 0.6  # of the range
@@ -54,8 +53,7 @@ def flowing_back(
 def yielded_from(info: Mapping[str, Any]) -> float:
     """Of BACK_FROM, the load (share of `top`) from which on a knee's lowest radius was passed: what
     never yielded leaves nothing to flow back."""
-    weight = info.get("weight")
-    alone = 0.0 if weight is None else float(np.abs(weight).max())
+    alone = float(np.abs(info.get("weight", 0.0)).max())
     lowest = (float(np.min(info["radius"])) - alone) / float(info["top"])
     return max((share for share in BACK_FROM if share <= lowest + 1e-9), default=BACK_FROM[0])
 
@@ -64,9 +62,8 @@ def peaks(load: Array, threshold: float, fresh: Flags) -> Ints:
     """(n,) row of the largest load before a row, -1 where nothing beyond the threshold has been
     reversed since the memory was last fresh."""
     size = np.abs(load)
-    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
     peak_of = np.full(len(load), -1)
-    for a, b in pairwise(edges):
+    for a, b in whiles(fresh):
         peak = np.maximum.accumulate(size[a:b])
         turned = (peak > threshold) & (size[a:b] < peak - _REVERSED * size.max())
         if turned.any():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from identification.arrays import Array
@@ -9,16 +12,31 @@ from identification.gap.laws.curves import BENT_SLOPE, hinge
 from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter
 from identification.gap.laws.law import Law, Term
 from identification.gap.model.bench import Bench
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import Variant, variant
 
 SCALES = (0.03, 0.08, 0.2)
-BENCH_SCALE = 0.6  # excitations and ranges are set wrong on rigs without an arm
-BENDS = np.diag([1.0, 0.08])  # at full range, of what the gain is off
+_BENCH_SCALE = 0.6  # excitations and ranges are set wrong on rigs without an arm
+_BENDS = np.diag([1.0, 0.08])  # at full range, of what the gain is off
 
 
-def scales(bench: Bench) -> tuple[float, ...]:
+def _scales(bench: Bench) -> tuple[float, ...]:
     """Of a gain that is the same all over the range."""
-    return SCALES if bench.data.arm else (*SCALES, BENCH_SCALE)
+    return SCALES if bench.data.arm else (*SCALES, _BENCH_SCALE)
+
+
+def straight_and_bent(
+    bench: Bench, word: str, read: Array, column: Callable[[Array], int]
+) -> list[Variant]:
+    """The gain of a reading (n,) minus one, alone; and, of an arm, with what it has more at full
+    range: one spring's curve would be the same. column: from what is read to its place in the pool
+    of the bench."""
+    straight, top = column(read), float(np.abs(read).max())
+    out = [variant(word, "gain", [straight], _scales(bench), positive=False)]
+    if bench.data.arm and top > 0:
+        both = [straight, column(read * np.abs(read) / top)]
+        facts: dict[str, Any] = {"root": _BENDS, "positive": False, "prior": 0.5, "full": top}
+        out.append(variant(word, "gain that bends", both, SCALES, **facts))
+    return out
 
 
 def factor(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws.lasting import HARDENS, lasting
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import beginnings
+from identification.gap.model.history import whiles
 from identification.gap.model.variants import Variant
 from identification.gap.recording.turns import way_back
 
@@ -67,8 +66,7 @@ def grown(load: Array, radius: Array, fresh: Flags) -> Array:
     """(n, k): by how much the size of the load (n,) has ever been beyond the radii (k,) since the
     memory was fresh; each time with the sign that the load then had."""
     out = np.empty((len(load), len(radius)))
-    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
-    for a, b in pairwise(edges):
+    for a, b in whiles(fresh):
         largest = np.maximum.accumulate(np.abs(load[a:b]))
         beyond = np.maximum(largest[:, None] - radius, 0.0)
         grows = np.diff(beyond, axis=0, prepend=0.0)

@@ -80,9 +80,7 @@ class Leverage:
             stands = np.array(self._there, dtype=float)[rows.setup] * read
             columns += [bench.stacked(q=np.outer(stands, u)) for u in units]
         self._columns = np.column_stack(columns)
-        names = engine.base.names
-        self._springs = [f"spring{j + 1}" in names for j in range(bench.data.joints)]
-        self._own = np.array([n.startswith("spring") for n in names], dtype=bool)
+        self._own = np.array([n.startswith("spring") for n in engine.base.names], dtype=bool)
 
     def place(self, eta: float, beside: Iterable[Part], start: Array) -> Place:
         """The likeliest one with an imperfection of eta m, beside other parts, from start (k,)
@@ -128,7 +126,7 @@ class Leverage:
             offset = x[:3]
         if self._kind in ("joints", "both"):
             angles = x[k - m : k]
-        softer[self._springs] = x[k:]
+        softer[list(self._engine.base.springs)] = x[k:]
         return Place(offset, angles, softer, turn)
 
     def _shown(self, x: Array) -> Array:

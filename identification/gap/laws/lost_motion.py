@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -105,6 +106,25 @@ def resting_columns(bench: Bench, joint: int) -> dict[str, Array]:
         q[np.array([p == pose for p in poses])[bench.rows.setup], joint] = 1.0
         out[pose] = bench.stacked(q=q)
     return out
+
+
+def free_places(bench: Bench, loose: Flags) -> Iterator[tuple[int, bool, Flags]]:
+    """Setup, whether in its first run, and rows (n,) of every place that is left free: where the
+    joint is loose (n,), of setups in which it is held as well."""
+    for s in range(len(bench.data.setups)):
+        held = not np.all(loose[bench.rows.setup == s])
+        for first in (True, False):
+            place = loose_in(bench, s, first, loose)
+            if held and place.any():
+                yield s, first, place
+
+
+def loose_in(bench: Bench, s: int, first: bool, loose: Flags) -> Flags:
+    """(n,) loose rows of a setup, in its first run or in later ones."""
+    rows = bench.rows
+    mine = rows.setup == s
+    in_first = rows.run == rows.run[mine].min()
+    return np.asarray(mine & loose & (in_first if first else ~in_first))
 
 
 def less_rub(k: int) -> Array:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.arrays import Array, Flags
+from identification.arrays import Array
 from identification.gap.laws.flanks import Flanks, shapes
 from identification.gap.laws.law import Law, Term
-from identification.gap.laws.lost_motion import HELD, PLACED, Play, net, resting_columns
+from identification.gap.laws.lost_motion import (
+    HELD,
+    PLACED,
+    Play,
+    free_places,
+    loose_in,
+    net,
+    resting_columns,
+)
 from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.variants import Variant
 
@@ -31,8 +39,8 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         count = len(v.columns)
         return Law(constants, tuple(terms[:count])), np.array([1.0, 1.0, unit])[:count]
     terms = [Term("width"), Term("rub")]
-    law = Law(constants, ())
-    for s, first in _places(bench, law) if info["kind"] not in HELD else []:
+    loose = np.abs(net_of(bench, Law(constants, ()))) < constants["zone"]
+    for s, first, _ in free_places(bench, loose) if info["kind"] not in HELD else ():
         setup = bench.data.setups[s]
         terms.append(
             Term("place", {"pose": setup.pose, "direction": setup.direction, "first": first})
@@ -68,7 +76,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
         key = (t.shape["pose"], t.shape["direction"])
         place = np.zeros(bench.rows.n)
         if key in names:
-            place = _place(bench, names.index(key), t.shape["first"], loose).astype(float)
+            place = loose_in(bench, names.index(key), t.shape["first"], loose).astype(float)
         out.append(bench.joint_column(joint, place))
     return out
 
@@ -78,22 +86,3 @@ def net_of(bench: Bench, law: Law) -> Array:
     c = law.constants
     tool, preload = c.get("tool", TOOL_KG), c.get("preload", 0.0)  # a file may lack them
     return net(bench, c["joint"], c["crossing"], tool, preload)
-
-
-def _places(bench: Bench, law: Law) -> list[tuple[int, bool]]:
-    """(setup, whether in its first run) of every place that the library leaves free."""
-    loose = np.abs(net_of(bench, law)) < law.constants["zone"]
-    out = []
-    for s in range(len(bench.data.setups)):
-        held = not np.all(loose[bench.rows.setup == s])
-        for first in (True, False):
-            if held and _place(bench, s, first, loose).any():
-                out.append((s, first))
-    return out
-
-
-def _place(bench: Bench, s: int, first: bool, loose: Flags) -> Flags:
-    rows = bench.rows
-    mine = rows.setup == s
-    in_first = rows.run == rows.run[mine].min()
-    return np.asarray(mine & loose & (in_first if first else ~in_first))

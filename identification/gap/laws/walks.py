@@ -10,7 +10,7 @@ settle under repeated loads.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws.lasting import lasting
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import beginnings
+from identification.gap.model.history import whiles
 from identification.gap.model.variants import Variant
 
 WALKS = " that walks"
@@ -74,10 +74,9 @@ def walked(load: Array, radius: Array, fading: Array, fresh: Flags) -> Array:
     """(n, k) way beyond the thresholds radius (k,) that a load (n,) has gone, pass by pass; the
     passes, counted since the memory was fresh, by n^-fading."""
     out = np.zeros((len(load), len(radius)))
-    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
     for r in np.unique(radius):
         mine = np.flatnonzero(radius == r)
-        for a, b in pairwise(edges):
+        for a, b in whiles(fresh):
             for number, start, end in _passes(np.abs(load[a:b]), r):
                 part = load[a + start : a + end]
                 beyond = np.maximum(np.maximum.accumulate(np.abs(part)) - r, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,18 @@ class Base:
         """Columns whose name begins so; a number at the end of that is a whole one."""
         begins = re.compile(re.escape(prefix) + (r"(?!\d)" if prefix[-1:].isdigit() else ""))
         return [i for i, name in enumerate(self.names) if begins.match(name)]
+
+    @cached_property
+    def springs(self) -> dict[int, int]:
+        """Joint (from 0) -> column of its spring, of those that have one."""
+        return {int(self.names[i].removeprefix("spring")) - 1: i for i in self.index("spring")}
+
+    def softer(self, found: Array, joints: int) -> Array:
+        """(joints,) relative changes of the springs' compliance among coefficients (k,) that were
+        found; 0 of a joint without a spring of its own."""
+        out = np.zeros(joints)
+        out[list(self.springs)] = found[list(self.springs.values())]
+        return out
 
 
 def prediction(bench: Bench) -> Array:
@@ -101,9 +114,8 @@ def compliance_found(bench: Bench) -> Array:
     root = base.columns * (base.sd / bench.sigma[:, None])
     seen = (bench.observed - bench.stacked(bench.slope * bench.load, bench.elastic)) / bench.sigma
     found = base.sd * np.linalg.solve(root.T @ root + np.eye(len(base.sd)), root.T @ seen)
-    softer = dict(zip(base.names, found.tolist(), strict=True))
-    change = [softer.get(f"spring{j + 1}", 0.0) for j in range(bench.data.joints)]
-    return np.asarray(bench.compliance * np.clip(1 + np.array(change), *_SOFTER))
+    change = base.softer(found, bench.data.joints)
+    return np.asarray(bench.compliance * np.clip(1 + change, *_SOFTER))
 
 
 _WIDE = 0.5  # a joint may be half or twice as stiff

@@ -91,6 +91,11 @@ def beginnings(fresh: Flags) -> Flags:
     return np.asarray(fresh | (np.arange(len(fresh)) == 0))
 
 
+def whiles(fresh: Flags) -> list[tuple[int, int]]:
+    """First row of every while in which a memory counts, and the one after its last."""
+    return list(pairwise([*np.flatnonzero(beginnings(fresh)).tolist(), len(fresh)]))
+
+
 def bristles(
     load: Array, reach: Array, fresh: Flags, elastic: bool, weight: Array | None = None
 ) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.model.history import bristles, play
+from identification.gap.model.history import bristles, play, whiles
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +38,7 @@ class Path:
         that: none until the load is back where they were last pushed to, less the radius, on either
         side for itself."""
         out = np.zeros((len(self.load), len(radius)))
-        starts = np.flatnonzero(self.fresh)
-        starts = starts if len(starts) and starts[0] == 0 else np.insert(starts, 0, 0)
-        for a, b in zip(starts, np.append(starts[1:], len(self.load)), strict=True):
+        for a, b in whiles(self.fresh):
             for sign in (1.0, -1.0):
                 pushed = sign * self.load[a:b]
                 worn = np.maximum(np.maximum.accumulate(pushed)[:, None] - radius, 0.0)
@@ -82,9 +80,8 @@ def load_path(
 def worked_in(path: Path) -> Path:
     """The path, without weights, with a cycle to its largest load and back before every fresh
     start."""
-    starts = np.flatnonzero(path.fresh)
     parts, begins, kept = [], [], []
-    for a, b in zip(starts, np.append(starts[1:], len(path.load)), strict=True):
+    for a, b in whiles(path.fresh):
         load = path.load[a:b]
         top = load[int(np.abs(load).argmax())]
         parts.append(np.concatenate([[top, 0.0], load]))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from identification.arrays import Array
@@ -34,6 +32,3 @@ class Pool:
 
     def __len__(self) -> int:
         return len(self._columns)
-
-    def __iter__(self) -> Iterator[Array]:
-        return iter(self._columns)

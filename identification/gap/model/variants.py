@@ -254,7 +254,7 @@ def _but_for_numbers(fact: object) -> object:
     return fact if isinstance(fact, bool) else None
 
 
-def smooth_root(k: int, alike: float = 0.7, common: float = 0.0) -> Array:
+def smooth_root(k: int, alike: float, common: float = 0.0) -> Array:
     """Root (k, k) of a covariance in which neighbours correlate by `alike`, all by `common`."""
     distance = np.abs(np.arange(k)[:, None] - np.arange(k))
     covariance = (1 - common) * alike**distance + common

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from identification.arrays import Array, Ints
 from identification.gap.data import GapData
 from identification.gap.recording.turns import passes
+from identification.running import first_rows
 
 _ROWS_PER_PASS, _MOST_ROWS = 80, 4000  # memory needs the turning points of every cycle
 CONTINUOUS_ROWS = 500  # bins of a continuous recording; more tells no effect from another
@@ -86,7 +87,7 @@ def _hold_edges(hold: Ints, time: Array) -> Ints:
     """Bins of 1, 1, 2, 4, 8 ... samples from the start of every hold; where these are taken ever
     more seldom, as creep often is, no bin over more than twice its time since then. None is a large
     part of the recording: a room warms and cools while a weight hangs."""
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
+    starts = first_rows(hold)
     count = np.diff(np.append(starts, len(hold)))
     within = np.arange(len(hold)) - np.repeat(starts, count)
     edge = (within & (within - 1)) == 0  # 0, 1, 2, 4, 8 ...
@@ -117,8 +118,7 @@ def _continuous_edges(data: GapData) -> Ints:
     if n <= (_MOST_ROWS if data.arm else wanted):  # an arm's few levels are left in a sample or two
         return np.arange(n, dtype=np.int64)
     number = even_path(data.force, data.displacement, wanted)
-    new = (np.diff(number, prepend=-1) != 0) | (np.diff(data.run, prepend=-1) != 0)
-    return np.flatnonzero(new).astype(np.int64)
+    return first_rows(number, data.run)
 
 
 def even_path(force: Array, displacement: Array, wanted: int) -> Ints:

@@ -22,6 +22,7 @@ from identification.gap.recording.holds import (
 from identification.gap.recording.ramps import much_to_go
 from identification.gap.recording.relaxing import relaxed
 from identification.gap.recording.turns import rises
+from identification.running import first_rows, stretches
 
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
 
@@ -190,22 +191,21 @@ def reduce_rows(data: GapData) -> Rows:
     mean, first, weight = bins.mean, bins.first, bins.count.astype(float)
     run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
     force, displacement = mean(data.force), mean(data.displacement)
-    holds = _blocks(run) if bins.running else _consecutive(first(hold))
+    holds = _blocks(run) if bins.running else stretches(first(hold))
     ramp = first(data.ways)
     if bins.running:
         level = _continuous_levels(setup, force)
     else:
         came = _approach(run, branch, holds, force)
-        level = _ids(np.column_stack([setup, branch, step, ramp, *came]))
+        level = ids(np.column_stack([setup, branch, step, ramp, *came]))
     meter, at_zero = data.instruments, (branch == ZERO) & (step <= 0)
     # of what runs, holds are but stretches; a run that begins unloaded comes from nowhere
-    stay = _consecutive(_ids(np.column_stack([run, branch, step]))) if bins.running else holds
-    begins = (stay == stay[_changes(run)][_consecutive(run)]) & at_zero
+    stay = stretches(ids(np.column_stack([run, branch, step]))) if bins.running else holds
+    begins = (stay == stay[first_rows(run)][stretches(run)]) & at_zero
     coming = ramp | (much_to_go(displacement, stay, meter.displacement) & ~begins)
     still = partial(_still, bins, rest_ids(data, hold), holds, ~coming)
     steadied, steady = still(data.force, meter.force)
     time, stands = mean(data.time), steady & ~at_zero
-    steadied = steadied * (1 + relaxed(force, displacement, time, holds, weight, stands))
     rested, rests = still(data.displacement, meter.displacement)
     session = _session(data)
     return Rows(
@@ -221,7 +221,7 @@ def reduce_rows(data: GapData) -> Rows:
         hold=holds,
         level=level,
         weight=weight,
-        force=steadied,
+        force=steadied * (1 + relaxed(force, displacement, time, holds, weight, stands)),
         measured_force=force,
         steady=steady,
         displacement=displacement,
@@ -263,36 +263,36 @@ def _blocks(run: Ints) -> Ints:
     """Stretches of a continuous recording over which a model's imperfection stays alike:
     fifty, since a smooth curve makes no more independent mistakes than that."""
     length = max(1, -(-len(run) // _STRETCHES))
-    new = (np.arange(len(run)) % length == 0) | _changes(run)
-    return (np.cumsum(new) - 1).astype(np.int64)
+    return stretches(np.arange(len(run)) // length, run)
 
 
 _STRETCHES = 50
 
 
 def _continuous_levels(setup: Ints, force: Array) -> Ints:
-    rising = rises(force)
-    span = np.ptp(force) or 1.0
-    number = np.minimum((force - force.min()) / span * _LEVELS, _LEVELS - 1).astype(np.int64)
-    return _ids(np.column_stack([setup, rising.astype(np.int64), number]))
+    return ids(np.column_stack([setup, rises(force).astype(np.int64), classes(force, _LEVELS)]))
+
+
+def classes(values: Array, count: int) -> Ints:
+    """(n,) which of so many even parts of their range values (n,) lie in."""
+    span = float(np.ptp(values)) or 1.0
+    number = np.minimum((values - values.min()) / span * count, count - 1)
+    return np.asarray(number, dtype=np.int64)
 
 
 def _approach(run: Ints, branch: Ints, hold: Ints, force: Array) -> tuple[Ints, Ints]:
     """(n,), (n,): to which side the force of a hold pushes, and, of a cycle, which way it came
     there: one number may stand for steps of the same size to and fro."""
     mean = np.bincount(hold, weights=force) / np.bincount(hold)
-    first = np.flatnonzero(_changes(hold))
+    first = first_rows(hold)
     came = np.where(_changes(run[first]), 0.0, np.sign(np.diff(mean, prepend=0.0)))
     way = np.where(branch[first] == CYCLE, came, 0.0)
     return side_of(mean)[hold].astype(np.int64), way[hold].astype(np.int64)
 
 
-def _ids(keys: Ints) -> Ints:
+def ids(keys: Array | Ints) -> Ints:
+    """(n,) the same number for the same keys (n, k)."""
     return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
-
-
-def _consecutive(ids: Ints) -> Ints:
-    return (np.cumsum(_changes(ids)) - 1).astype(np.int64)
 
 
 def _session(data: GapData) -> Array:

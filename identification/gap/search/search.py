@@ -16,6 +16,7 @@ from identification.gap.explanations.explanation import (
     Explanation,
     SearchResult,
     explain,
+    joined,
     up_to_likeliest,
 )
 from identification.gap.explanations.priors import LOG_NONE, log_unknown
@@ -54,9 +55,7 @@ def search(
     alone = {w: marginal(s) for w, s in families.items()}
     pool: dict[frozenset[str], Explanation] = {}
     for word, scored in families.items():
-        top = closest(scored)
-        part = Part(top.variant, top.scale)
-        pool[frozenset([word])] = explain(engine, (part,), alone[word])
+        pool[frozenset([word])] = joined(engine, (), scored, 0.0)
     none = _as_stated(engine)
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
@@ -279,9 +278,7 @@ def _with_one_more(
         for scored in (found_words[word], _elsewhere(start, found_words[word])):
             if not scored:
                 continue
-            top = closest(scored)
-            parts = (*start.parts, Part(top.variant, top.scale))
-            found = explain(engine, parts, marginal(scored), energy)
+            found = joined(engine, start.parts, scored, energy)
             better = out.get(words, known.get(words))
             if better is None or better.log_weight < found.log_weight:
                 out[words] = found

@@ -31,6 +31,7 @@ from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import retarded
 from identification.gap.model.variants import Variant, smooth_root, variant
+from identification.gap.recording.rows import ids
 
 KINDS = 6
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
@@ -187,8 +188,7 @@ def _rough(bench: Bench, target: Array) -> list[Variant]:
     bench not where these make a smooth curve, which a spring may have."""
     rows = bench.rows
     step = np.round(bench.load / (_ALIKE * float(np.ptp(bench.load)) or 1.0))
-    place = np.unique(np.column_stack([rows.setup, step]), axis=0, return_inverse=True)[1]
-    place = place.reshape(-1)
+    place = ids(np.column_stack([rows.setup, step]))
     if not int(place.max()) < _MOST_LEVELS:
         return []
     if not bench.data.arm and _one_curve(bench, place, target[: rows.n]):
@@ -245,7 +245,7 @@ def _settles(bench: Bench) -> list[Variant]:
     if not (bench.data.arm and step > 0 and times.size):
         return []
     line = np.tile((bench.slope * bench.load)[:, None], (1, len(times)))
-    z = retarded(line, times, rows, bench.rest, None)
+    z = retarded(line, times, rows, bench.rest)
     z /= float(np.abs(z).max()) or 1.0
     masks = [(rows.setup == s).astype(float) for s in np.unique(rows.setup)]
     columns = [bench.add(bench.outside_column(m * c)) for m in masks for c in z.T]
