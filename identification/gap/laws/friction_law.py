@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.interval import Coefficients, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import (
     ACROSS,
     ANEW,
@@ -188,7 +188,9 @@ def exponential_laws(bench: Bench) -> tuple[str, ...]:
 
 def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Of the strengths that slip, which takes a load beyond them, and of those near the largest one
-    the less the less they do; of friction in proportion to the load, at the largest one."""
+    the less the less they do; of friction in proportion to the load, at the largest one. Of those
+    that slip before the first reading after a turn no reading tells how far they give way before:
+    they may be as strong as that turn shows, and so much stiffer."""
     radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])
     if v.other_springs:
         found = found.without_line(joint)
@@ -204,12 +206,34 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
         found = found.on_spring(1 - slips if stiffens else slips - 1, joint)
     if law in ON_TOP:  # of all that gives way at large loads, as of the other convention
         found = found.on_spring(slips, joint)
-    share = found.per_spring(slips, joint)
-    if bench.data.arm or not bench.imposed:  # no friction holds back more than all
-        share = replace(share, most=1.0)
-    unit = bench.torque_unit
-    if bench.imposed and not bench.data.arm:  # what slips beside the spring: a force, as it is
+    beside = bench.imposed and not bench.data.arm  # of the spring: a force, as it is
+    most, unit = np.inf if beside else 1.0, bench.torque_unit
+    hidden = slips * np.clip(1 - radius / max(_seen_from(bench, joint), _TINY), 0.0, 1.0)
+    share = _between(
+        found.per_spring(slips, joint), found.per_spring(slips - hidden, joint).value, most
+    )
+    if beside:
         friction = found.linear(slips * radius, unit)
     else:
         friction = found.per_spring(slips * radius, joint, unit)
     return {"friction": friction, "share_through_friction": share}
+
+
+def _between(share: Parameter, least: float, most: float) -> Parameter:
+    """A share that may be as small as `least`, no larger than `most`: what was found, or, where it
+    can't be that and may be less, anywhere between (GUM 4.3.7)."""
+    if share.value <= most or least >= most:
+        down = float(np.hypot(share.value - share.low, max(share.value - least, 0.0)))
+        return replace(share, low=share.value - down, most=most)
+    found = normal((least + most) / 2, share.sd**2 + (most - least) ** 2 / 12, share.unit)
+    return replace(found, most=most)
+
+
+def _seen_from(bench: Bench, joint: int) -> float:
+    """Nm: strength that slips by the first reading after a turn of the load, where that is nearest
+    to the turn: half of what the load has changed by then. 0 where it never turns."""
+    rows = bench.rows
+    load, run = bench.true_torque[rows.edges, joint], rows.run[rows.edges]
+    step, within = np.diff(load), np.diff(run) == 0
+    turns = (step[1:] * step[:-1] < 0) & within[1:] & within[:-1]
+    return float(np.abs(step[1:][turns]).min(initial=np.inf)) / 2 if turns.any() else 0.0

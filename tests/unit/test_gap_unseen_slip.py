@@ -1,0 +1,55 @@
+"""Friction that slips before the first reading after a turn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.data import GapData
+from tests.explained import explained
+from tests.unit.test_gap_operators import bench_data
+
+SPRING, STIFF, FRICTION = 95e3, 300e3, 8.0  # N/m until it slips, beside the spring; N
+SHARE = STIFF / (SPRING + STIFF)  # of the compliance, what friction holds back until it slips
+
+
+def rubbing(step_N: float) -> GapData:
+    """A spring beside which friction slips at 8 N; up, down, back and once more, in levels."""
+    up = np.arange(0.0, 200.1, step_N)
+    once = np.concatenate([up[1:], up[-2::-1], -up[1:], -up[-2::-1]])
+    load = np.tile(once, 2)
+    x = held = before = 0.0
+    moved = []
+    for level in load:
+        for f in np.linspace(before, level, 400)[1:]:
+            stick = (f - before) / (SPRING + STIFF)
+            if abs(held + STIFF * stick) < FRICTION:
+                x, held = x + stick, held + STIFF * stick
+            else:
+                x += (f - before) / SPRING
+                held = float(np.sign(f - before)) * FRICTION
+            before = f
+        moved.append(x)
+    rng = np.random.default_rng(1)
+    each = np.repeat([load, moved], 3, axis=1)
+    force = each[0] + rng.normal(0, 0.1, len(each[0]))
+    data = bench_data(force, each[1] + rng.normal(0, 2e-6, len(force)))
+    meter = replace(data.instruments, force=0.1, displacement=2e-6)
+    step = np.repeat(np.tile(np.arange(1, len(once) + 1), 2), 3)
+    return replace(data, step=step, compliance=np.array([1 / SPRING]), instruments=meter)
+
+
+@pytest.mark.parametrize(("step_N", "widest"), [(20.0, 0.6), (4.0, 0.3)])
+def test_how_far_friction_gives_way_is_known_as_far_as_readings_show_it(
+    step_N: float, widest: float
+) -> None:
+    """In steps of 20 N it has slipped by the next reading: anything up to all is possible."""
+    found = explained(rubbing(step_N))
+    assert found.verdict == "joint_hysteresis"
+    parameters = found.effects[0].parameters
+    assert parameters["friction"].value == pytest.approx(FRICTION, rel=0.05)
+    share = parameters["share_through_friction"]
+    assert share.low < SHARE < share.high <= 1.0
+    assert 0.005 < share.high - share.low < widest
