@@ -197,8 +197,10 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
     largest = float(np.abs(bench.torque[:, joint]).max())
     if "saturates" in v.info:  # strengths are those of what comes through
         largest = float(saturating(np.array(largest), v.info["saturates"]))
-    slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
     law = str(v.info["law"])
+    slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
+    if law in EXPONENTIAL or law in SLIPPING:  # bends from the first load on
+        slips = np.maximum(slips, -np.expm1(-largest / radius))
     if law in BY_LOAD:
         radius = np.full(len(radius), largest)
     if law == "Iwan":  # what never slips is a spring like the joint's own, beside it
