@@ -3,6 +3,7 @@ to it."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,10 @@ from identification.gap.explanations.explanation import Explanation, SearchResul
 from identification.gap.judging.leftover import ARM_AS_STATED, AS_STATED, FOR_NOTHING, looked_up
 from identification.gap.model.base import base_columns
 from identification.gap.search.search import search
+from tests.explained import explained
 from tests.unit.small_explanations import part, said, small_engine_of
 from tests.unit.test_gap_evidence import small_bench
+from tests.unit.test_gap_operators import bench_data
 
 SLANT, GAIN, CURVE = "load_misalignment", "force_scale", "joint_nonlinear_stiffness"
 
@@ -56,3 +59,22 @@ def test_of_an_arm_nothing_is_wrong_while_springs_are_as_stated() -> None:
         (none,) = looked_up(found_off(off, (said((), ()),))).explanations
         assert np.exp(none.log_good - none.log_weight) == pytest.approx(kept, rel=0.1)
         assert none.log_weight == said((), ()).log_weight  # the rest is nobody's
+
+
+@pytest.mark.parametrize(("stiffer", "said"), [(1.05, False), (1.3, True), (0.8, True)])
+def test_a_spring_that_is_far_off_is_said_where_nothing_else_is_wrong(
+    stiffer: float, said: bool
+) -> None:
+    """Stated to a tenth."""
+    up = np.arange(0.0, 210.0, 10.0)
+    force = np.tile(np.repeat(np.append(up, up[-2::-1]), 4), 3)
+    rng = np.random.default_rng(3)
+    moved = force * 1e-5 / stiffer + rng.normal(0, 1e-6, len(force))
+    level = np.tile(np.repeat(np.arange(2 * len(up) - 1), 4), 3)
+    found = explained(bench_data(force, moved, step=level))
+    assert found.verdict == "none"
+    notes = [n for n in found.notes if "times as stiff as simulated" in n]
+    assert bool(notes) is said
+    for note in notes:
+        (told,) = re.findall(r"has to be (\S+) times", note)
+        assert float(told) == pytest.approx(stiffer, rel=0.01)

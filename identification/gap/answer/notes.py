@@ -215,6 +215,28 @@ def readings_missed(engine: Engine, fitted: Fit) -> tuple[Note, ...]:
 _MISSED, _OF_WAY = 5.0, 0.05  # times the noise; of the way that the joint turns
 
 
+def springs_far_off(engine: Engine, fitted: Fit) -> tuple[Note, ...]:
+    """Of springs that come out farther from what was simulated than what META states lets expect,
+    where that alone is no effect: it is where the gap went."""
+    base, data, out = engine.base, engine.bench.data, []
+    for j, i in base.springs.items():
+        off = float(fitted.base[i] / base.sd[i])
+        if abs(off) < (_FAR_OFF_OF_MANY if data.arm else _FAR_OFF):
+            continue
+        ratio = max(1 + float(fitted.base[i]), _TINY)
+        stiffer = ratio if engine.bench.imposed and not data.arm else 1 / ratio
+        of = data.spring_name(j) if data.arm else f"the spring along {data.spring_name(j)}"
+        text = (
+            f"To explain that, {of} has to be {stiffer:.3g} times as stiff as simulated, "
+            f"{abs(off):.1f} standard deviations of what META states: see to that number."
+        )
+        out.append(Note(REMARK, text))
+    return tuple(out)
+
+
+_FAR_OFF, _FAR_OFF_OF_MANY, _TINY = 2.0, 3.0, 1e-6  # standard deviations
+
+
 def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
     """Why the best explanation was not believed, where that is what it does, or what an arm's asks
     for: META may state too little, and only its author can tell."""

@@ -22,6 +22,7 @@ from identification.gap.answer.notes import (
     notes_of,
     ordered,
     readings_missed,
+    springs_far_off,
 )
 from identification.gap.answer.posterior import Known
 from identification.gap.answer.scale import off_scale
@@ -131,6 +132,7 @@ def result_of(
     notes = [*contradicted, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
+    notes += springs_far_off(engine, fitted) if verdict == "none" else ()
     notes += [*called(found, chosen, verdict), *left_out(chosen, fuller)]
     return GapResult(
         verdict=verdict,
