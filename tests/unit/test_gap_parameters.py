@@ -6,6 +6,7 @@ import gc
 import weakref
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -491,3 +492,22 @@ def test_a_threshold_about_a_lying_axis_is_as_uncertain_as_its_depth() -> None:
     lever = 0.175 / 12**0.5
     assert spread["x"] > spread["z"] + 0.02
     assert spread["x"] == pytest.approx(np.hypot(spread["z"], lever / 1.2), rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("imposed", "possible"), [("force", (-1.0, np.inf)), ("displacement", (-np.inf, 1.0))]
+)
+def test_no_spring_loses_more_than_it_has(
+    imposed: Literal["force", "displacement"], possible: tuple[float, float]
+) -> None:
+    """Compliance where the force is driven, stiffness where the displacement is."""
+    load = 80 * np.sin(np.arange(300) / 15)
+    data = bench_data(load, load * 1e-5, step=np.full(300, -1), branch=np.full(300, 3))
+    bench = make_bench(replace(data, imposed=imposed))
+    curve = of(bench, "joint_nonlinear_stiffness", "cubic")
+    w = np.full(len(curve.columns), -3.0)
+    (p,) = parameters(bench, Part(curve, 1.0), w, 0.01 * np.eye(len(w)), NOMINAL).values()
+    least, most = possible
+    found = p.possible(-np.inf)
+    assert least <= found.low <= found.value <= found.high <= most
+    assert found.value in possible

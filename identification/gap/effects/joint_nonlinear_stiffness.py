@@ -14,6 +14,7 @@ Source: three-part stiffness in catalogues of strain wave gears.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -219,13 +220,16 @@ def _uneven(bench: Bench, j: int, line: int) -> Variant:
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """What the compliance at the largest torque has more than at none, over that at none: a hinge
-    adds itself, a power its exponent; a line is part of the spring that was found."""
+    adds itself, a power its exponent; a line is part of the spring that was found. No spring loses
+    more compliance, or stiffness, than it has."""
     joint, kinds = int(v.info["joint"]), v.info["kinds"]
     grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}
     change = bench.sense * np.array([grows.get(kind, 1.0) for kind in kinds])
     line = np.array([float(kind == "line") for kind in kinds])
     found = found.on_spring(line, joint)
-    return {"change_of_compliance_over_range": found.per_spring(change, joint)}
+    p, of_stiffness = found.per_spring(change, joint), bench.sense < 0
+    p = replace(p, most=1.0) if of_stiffness else replace(p, least=-1.0)
+    return {"change_of_compliance_over_range": p}
 
 
 def _look_closer(word: Word) -> list[Variant]:

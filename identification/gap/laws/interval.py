@@ -13,9 +13,9 @@ from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 @dataclass(frozen=True)
 class Parameter:
     """value with its 95 % interval; inner: the 90 % one, where no normal law gives it: a threshold
-    that may be at one depth or another has two places, and nothing between. most: the largest that
-    is possible: of a threshold the largest load, as none above it is seen. by_factors: it is known
-    to a factor, as a time constant is."""
+    that may be at one depth or another has two places, and nothing between. most, least: the
+    largest and the smallest that is possible: of a threshold the largest load, as none above it is
+    seen. by_factors: it is known to a factor, as a time constant is."""
 
     value: float
     low: float
@@ -23,6 +23,7 @@ class Parameter:
     unit: str
     inner: tuple[float, float] | None = None
     most: float = np.inf
+    least: float = -np.inf
     by_factors: bool = False
 
     @property
@@ -66,6 +67,7 @@ class Parameter:
         infinite where all of the 95 % lay below it anyway."""
         if not self.low < self.high:
             return self
+        least = max(least, self.least)
         value = float(np.clip(self.value, least, self.most))
 
         def of(ends: tuple[float, float], deviations: float) -> tuple[float, float]:
