@@ -20,12 +20,8 @@ from identification.gap.answer.posterior import (
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import run_seconds
 from identification.gap.effects.time_lag import closest_lag, late
-from identification.gap.evidence.engine import (
-    HOLD_PART,
-    ROW_PART,
-    Engine,
-    level_covariance,
-)
+from identification.gap.evidence.alike import level_covariance
+from identification.gap.evidence.engine import HOLD_PART, ROW_PART, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
