@@ -57,6 +57,7 @@ class Diagnosis:
             "verdict": r.verdict,
             "nothing_learned": r.learned_nothing,
             "displacement_met": r.met,
+            "hidden_by_scatter": r.hidden,
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},
             "meanings": meanings(arm=r.bench.data.arm),
             "effects": [_effect(e, r.bench.data) for e in r.effects],

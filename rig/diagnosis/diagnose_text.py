@@ -161,17 +161,25 @@ def _answer(r: GapResult) -> str:
     like = None if r.looks_like is None else looks_like(r.looks_like, arm=r.bench.data.arm)
     meaning = meanings(arm=r.bench.data.arm).get(r.verdict, "")
     met = r.verdict == "unknown" and r.met
-    told = answer(r.verdict, meaning, r.names, like, nothing=r.learned_nothing, met=met)
+    nothing, hidden = r.learned_nothing, r.hidden
+    told = answer(r.verdict, meaning, r.names, like, nothing=nothing, met=met, hidden=hidden)
     shown = told.format(before=before, after=after, noise=noise)
     return f"{r.verdict} ({likely(r.probabilities[r.verdict])}): {shown}"
 
 
 def answer(
-    verdict: str, meaning: str, names: Iterable[str], like: str | None, *, nothing: bool, met: bool
+    verdict: str,
+    meaning: str,
+    names: Iterable[str],
+    like: str | None,
+    *,
+    nothing: bool,
+    met: bool,
+    hidden: bool,
 ) -> str:
     """What a verdict says, with {before}, {after} and {noise} where rms in mm are to stand. names:
     of the effects; like: what an unknown gap looks like; nothing: that was learned; met: what is
-    left of the displacement is no more than noise."""
+    left of the displacement is no more than noise; hidden: it is no more than readings scatter."""
     alone = "the instruments alone leave {noise} mm."
     if nothing:
         return (
@@ -183,6 +191,12 @@ def answer(
             f"{OTHERWISE[verdict]} that was measured. There is no gap to close. Of the {{before}} "
             "mm rms that the simulation misses as it stands, {after} mm remain when these are "
             f"fitted within that; {alone}"
+        )
+    if hidden:
+        return (
+            "the readings scatter far more than META states, and what makes them do so is not "
+            "known: {after} of {before} mm rms remain, the scatter alone leaves {noise} mm. A "
+            "smaller gap would not be seen."
         )
     if verdict == "unknown" and met:
         return (

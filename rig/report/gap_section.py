@@ -56,6 +56,7 @@ def _answer(found: Node) -> Rich:
         None if like.value is None else like["text"].text(),
         nothing=found["nothing_learned"].value,
         met=found["displacement_met"].value,
+        hidden=found["hidden_by_scatter"].value,
     )
     sizes = {k: found["gap"][f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise")}
     parts = re.split(r"\{(before|after|noise)\}", told)

@@ -9,6 +9,7 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.recording.trembling import force_as_it_scatters
+from rig.diagnosis.diagnose_text import render
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
@@ -62,3 +63,18 @@ def test_noise_of_the_force_is_no_lag(seed: int) -> None:
     assert any("force scatters" in n for n in found.notes)
     quiet = explained(stepped(3, 0.1, seed=seed))
     assert not any("scatter" in n for n in quiet.notes)
+
+
+def test_where_readings_scatter_far_more_than_stated_no_gap_is_said_to_be_there() -> None:
+    data = stepped(5, 0.1)
+    noise = np.random.default_rng(5).normal(0, 9 * LASER_M, len(data.force))
+    found = explained(replace(data, displacement=data.displacement + noise))
+    assert found.verdict == "unknown"
+    assert found.hidden
+    assert found.looks_like is None
+    text = render(found)
+    assert "scatter far more than META states" in text
+    assert "there is a gap" not in text
+    gap = np.where(data.step % 2 == 1, 60 * LASER_M, 0.0)  # more than it hides
+    seen = explained(replace(data, displacement=data.displacement + noise + gap))
+    assert not seen.hidden

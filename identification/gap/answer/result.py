@@ -97,8 +97,15 @@ class GapResult:
     @property
     def met(self) -> bool:
         """Of an arm: what is left is no more than noise, which is known to a fifth."""
-        bench = self.bench
-        return bench.data.arm and not bench.noise.misjudged and self.after <= _NOISE_TO * self.noise
+        known = self.bench.data.arm and not self.bench.noise.misjudged
+        return known and self.after <= _NOISE_TO * self.noise
+
+    @property
+    def hidden(self) -> bool:
+        """A gap that no effect explains, if there is one, is no more than readings scatter, which
+        is far more than was stated."""
+        lost = self.verdict == "unknown" and self.bench.noise.misjudged
+        return lost and self.after <= _NOISE_TO * self.noise
 
     @property
     def learned_nothing(self) -> bool:
@@ -134,7 +141,7 @@ def result_of(
     notes += readings_missed(engine, fitted) if chosen.parts else ()
     notes += springs_far_off(engine, fitted) if verdict == "none" else ()
     notes += [*called(found, chosen, verdict), *left_out(chosen, fuller)]
-    return GapResult(
+    result = GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
         effects=_effects(found, chosen, known),
@@ -153,6 +160,7 @@ def result_of(
         fit=fitted,
         found=found,
     )
+    return replace(result, looks_like=None) if result.hidden else result
 
 
 def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> Likeness | None:
