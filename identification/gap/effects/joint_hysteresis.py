@@ -66,8 +66,9 @@ from identification.gap.model.variants import (
 )
 
 SCALES = friction_forms.SCALES  # of all its shapes
-# Those of a specimen's closer look: loops of thousands of readings tell them apart.
-BETWEEN = tuple(sorted((*RADII, *((a * b) ** 0.5 for a, b in pairwise(RADII)))))
+# Friction beside a spring that is imposed a motion may be stiffer than it by any factor, until it
+# slips: seals, brushes and sliders give way by micrometres.
+STIFF = (0.0007, 0.002, 0.005)
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends all at once, at a large load, is a knee; what
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
@@ -157,7 +158,9 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         reach /= NEARER if found.info["law"] in BY_LOAD else 1.0
         finer = _exponential(bench, joint, name, reach / span, path)
     elif not bench.data.arm and bench.course.unloads:
-        finer = _spectra(bench, joint, name, span, path, BETWEEN)
+        every = _strengths(bench)  # loops of thousands of readings tell those between apart, too
+        between = [(a * b) ** 0.5 for a, b in pairwise(every)]
+        finer = _spectra(bench, joint, name, span, path, tuple(sorted((*every, *between))))
     else:
         return []
     out = [v.known_by(" fine", memory=memory, closely=True) for v in finer]
@@ -220,14 +223,15 @@ def _spectra(
     name: str,
     span: float,
     path: Path,
-    strengths: tuple[float, ...] = RADII,
+    strengths: tuple[float, ...] = (),
 ) -> list[Variant]:
     """The whole spectrum of strengths, which holds back what the spring would deflect; on an arm
     also where the stated spring is that of small loads, which make nothing slip: then every element
     adds its play (Prandtl 1928)."""
     torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    seen = strengths if bench.course.unloads else strengths[:_SMALL]
-    radius = span * np.array(ARM_RADII if bench.data.arm else seen)
+    seen = strengths or (ARM_RADII if bench.data.arm else _strengths(bench))
+    seen = seen if bench.data.arm or bench.course.unloads else seen[:_SMALL]
+    radius = span * np.array(seen)
     radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)
     slips = path.plays(radius)
@@ -241,6 +245,11 @@ def _spectra(
         within = friction_law.no_knee(bench, torque, radii, path)
         out.append(spectrum(label, joint, columns, radii, law, within=within))
     return out
+
+
+def _strengths(bench: Bench) -> tuple[float, ...]:
+    """Strengths that a specimen's friction may slip at, of its range."""
+    return (*STIFF, *RADII) if bench.imposed else RADII
 
 
 def _pairs(bench: Bench, name: str, span: float, whole: Variant, conventions: int) -> list[Variant]:
