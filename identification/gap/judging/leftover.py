@@ -32,6 +32,7 @@ from identification.gap.explanations.verdict import (
 from identification.gap.judging.broken import broken
 from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.hands import open_to_hands
+from identification.gap.judging.late import but_lags
 from identification.gap.judging.paths import goes_as_no_drift
 from identification.gap.judging.remains import readings_left, response_left
 from identification.gap.judging.stated import led_by_springs
@@ -44,6 +45,7 @@ from identification.gap.words import CURVES, FRICTION, LINEAR
 SNAPS, _FALL, _LOST = 0.1, 0.15, 0.6  # share that is kept; falls, of the range: beyond noise, most
 LET_GO = 1e-8  # share that is kept where forces let go at once: no law does that
 COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
+BUT_A_LAG = 1e4  # nats against a creep that is but a lag: beyond what any data bring
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
 # What takes any path in time is bound by no law that could be off: as the main cause it leaves
@@ -87,7 +89,10 @@ def looked_up(found: SearchResult) -> SearchResult:
             or (e.parts and any(e.words < w for w in lost))
         ]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
-    done |= {e.words: judge(engine, e) for e in _near(found.nameless)}
+    else:
+        every = (*found.explanations, *found.nameless)
+        done |= {e.words: _less_likely(e, BUT_A_LAG) for e in but_lags(engine, every)}
+    done |= {e.words: judge(engine, e) for e in _near(found.nameless) if e.words not in done}
     out, nameless = (
         tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
         for each in (found.explanations, found.nameless)
