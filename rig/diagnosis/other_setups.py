@@ -16,6 +16,8 @@ from rig.models.robot import load_robot
 from rig.units import MM_PER_M
 
 _NEARER_M = 0.2  # of the point of load towards the base's axis: levers about a quarter shorter
+_ROUNDING_M = 1e-3
+_CLEAR_M = 0.15  # above what the base stands on: a link is as thick, and cables hang from it
 
 
 def elsewhere(dataset: Dataset, model: ArmModel | None = None) -> list[Elsewhere]:
@@ -45,7 +47,9 @@ def elsewhere(dataset: Dataset, model: ArmModel | None = None) -> list[Elsewhere
 
 
 def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]]:
-    """Name -> (what to do, joint positions (6,) rad): nearer to the base, and elbow turned."""
+    """Name -> (what to do, joint positions (6,) rad): nearer to the base, and elbow turned. Nobody
+    says what stands around the arm; but no joint is lower than a pose that was measured has one, or
+    than is clear of what the base stands on."""
     pose = meta.poses[first]
     q, tool = np.array(pose.q_rad), tool_offset(np.array(pose.tcp_xyz_mm) / MM_PER_M)
     here = arm.fk(q, tool)
@@ -53,8 +57,8 @@ def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]
     reach = float(np.hypot(here[0, 3], here[1, 3]))
     share = min(_NEARER_M, 0.4 * reach) / max(reach, 1e-9)
     near[:2, 3] *= 1 - share
-    out = {}
-    found = _nearest(arm, near @ np.linalg.inv(tool), q)
+    floor, out = min(_lowest(arm, q), _CLEAR_M), {}
+    found = _nearest(arm, near @ np.linalg.inv(tool), q, floor)
     if found is not None:
         text = (
             f"Repeat the procedure with the point of load {MM_PER_M * share * reach:.0f} mm nearer "
@@ -64,7 +68,7 @@ def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]
     turned = [
         p
         for p in solutions(arm, here @ np.linalg.inv(tool), float(q[5])).values()
-        if p[2] * q[2] < 0
+        if p[2] * q[2] < 0 and _lowest(arm, p) >= floor - _ROUNDING_M
     ]
     if turned:
         best = min(turned, key=lambda p: float(np.abs(_wrapped(p - q)).max()))
@@ -76,8 +80,14 @@ def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]
     return out
 
 
-def _nearest(arm: Arm, flange: Array, q: Array) -> Array | None:
-    found = list(solutions(arm, flange, float(q[5])).values())
+def _lowest(arm: Arm, q: Array) -> float:
+    """m above the base's plane of the lowest joint beyond the shoulder, or the flange."""
+    return float(arm.frames(q)[2:, 2, 3].min())
+
+
+def _nearest(arm: Arm, flange: Array, q: Array, floor: float) -> Array | None:
+    each = solutions(arm, flange, float(q[5])).values()
+    found = [p for p in each if _lowest(arm, p) >= floor - _ROUNDING_M]
     if not found:
         return None
     return min(found, key=lambda p: float(np.abs(_wrapped(p - q)).max()))

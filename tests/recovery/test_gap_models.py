@@ -407,6 +407,8 @@ def test_other_places_are_where_they_say(paper: tuple[Dataset, Diagnosis]) -> No
     np.testing.assert_allclose(near[:3, :3], here[:3, :3], atol=1e-9)
     np.testing.assert_allclose(turned, here, atol=1e-9)
     assert found["P1_turned"][2] * q[2] < 0
+    for other in found.values():  # not into the table: the nearest turned one has its elbow there
+        assert arm.frames(other)[2:, 2, 3].min() > 0.149
     data_bench = make_bench(
         planned_data(load_model(MODELS / "F1.yaml"), load_protocol(PROTOCOLS / "paper_xy.yaml"))
     )
