@@ -57,16 +57,18 @@ _HELD_BACK = "of the compliance, what friction holds back until it slips; 1: not
 _STIFFER = "how stiff the friction is until it slips, over the spring's stiffness; it may pass 1"
 _BEYOND = "slope_beyond_over_elastic"
 _ADDED = "compliance added beyond the threshold, over the elastic one; 1: twice as soft there"
+_LOST = "stiffness lost beyond the threshold, over the elastic one; 1: none is left there"
 
 
 def parameter_meanings(r: GapResult) -> dict[str, str]:
     """Parameter -> what its number is, of those found that need it. Of a rig without an arm whose
     displacement is imposed, springs and friction are stiffnesses beside each other."""
     found, told = {name for e in r.effects for name in e.parameters}, {}
+    beside = r.bench.imposed and not r.bench.data.arm
     if _SHARE in found:
-        told[_SHARE] = _STIFFER if r.bench.imposed and not r.bench.data.arm else _HELD_BACK
+        told[_SHARE] = _STIFFER if beside else _HELD_BACK
     if _BEYOND in found:
-        told[_BEYOND] = _ADDED
+        told[_BEYOND] = _LOST if beside else _ADDED
     return told
 
 
@@ -99,7 +101,7 @@ LOOKS_LIKE = {
     "bumps, cross-talk or a damaged instrument; to be sure, measure between these levels",
     "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "
     "lets go, and to the laser's mounting; to be sure, hold one load for long",
-    "settles": "the displacement goes on while the load stands, and no joint does that: see to "
+    "settles": "the displacement goes on while the load stands, and not as a joint creeps: see to "
     "what rig and laser stand on, and to glue, rubber or wood; to be sure, hold one load for long, "
     "then none",
     "jerks": "it jumps at a few places, and stays there: a grip that slips, a part that cracks, a "
