@@ -161,6 +161,16 @@ def test_where_nothing_helps_nothing_is_proposed() -> None:
     assert "The best of 2: way 1" in some.text
 
 
+def test_where_no_procedure_helps_a_stand_can_be_looked_at() -> None:
+    """Joint 1 and a stand that turns move the arm alike in every pose."""
+    for pair in (("joint_yield", "base_slip"), ("base_compliance", "joint_stiffness_error")):
+        look = proposed(pair, 0.0, 0.0)
+        assert look is not None
+        assert (look.kind, look.design, look.separates) == ("none", None, pair)
+        assert "dial gauge" in look.text
+    assert proposed(("base_compliance", "base_slip"), 0.0, 0.0) is None
+
+
 @pytest.mark.parametrize("gain", [0.02, 0.1])
 def test_what_a_calibration_gives_is_what_its_readings_give_on_average(gain: float) -> None:
     """Log odds of a gain of about this size against none, over all readings of it, which scatter by

@@ -84,7 +84,7 @@ def next_measurement(
     """The proposal for two words, of which the first is in the chosen explanation.
 
     others: setups elsewhere, asked for only here. None where one of the words has no explanation,
-    no load moves the rig, or no procedure gives more than next to nothing.
+    no load moves the rig, or no procedure gives more than next to nothing, nor a look at the stand.
     """
     engine = found.engine
     if not engine.bench.reach > 0 or not np.ptp(engine.bench.load) > 0:
@@ -136,9 +136,9 @@ def _proposal(
         # but a gain can always be calibrated
         rated = sorted(rated, key=lambda r: r[0].kind != "calibrate")
         if rated[0][0].kind != "calibrate" or not _GAINS.keys() & set(pair):
-            return None
+            return _by_eye(pair)
     if not rated:
-        return None
+        return _by_eye(pair)
     best, candidate = rated[0]
     rest = tuple(o for o, _ in rated[1:])
     odds = f"expected: {_nats(best.expected_nats)} in about {best.minutes:.0f} min"
@@ -159,6 +159,21 @@ def _proposal(
     return NextMeasurement(
         text, pair, "none", best.expected_nats, best.minutes, tuple(o for o, _ in rated)
     )
+
+
+def _by_eye(pair: tuple[str, str]) -> NextMeasurement | None:
+    """Of an arm on its stand, where to look; no procedure is left to propose."""
+    if len(_OF_THE_STAND & set(pair)) != 1:
+        return None
+    return NextMeasurement(_LOOK_AT_THE_STAND, pair, "none")
+
+
+_OF_THE_STAND = frozenset({"base_slip", "base_compliance"})
+_LOOK_AT_THE_STAND = (
+    "No procedure of this rig is expected to tell them apart: both move the arm alike wherever it "
+    "stands, and no joint reading looks past its gear. A dial gauge, or the laser, against the "
+    "foot of the arm shows whether that moves."
+)
 
 
 def _nats(value: float) -> str:
