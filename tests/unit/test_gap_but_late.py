@@ -9,6 +9,9 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import CYCLE, GapData
+from identification.gap.effects.time_lag import late as lagged
+from identification.gap.laws.in_swing import steady_way
+from identification.gap.model.bench import make_bench
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
@@ -53,3 +56,25 @@ def test_what_creeps_beside_the_spring_that_was_stated_creeps() -> None:
         late[i] = late[i - 1] + (load[i - 1] - late[i - 1]) / (HZ * tau)
     found = explained(recorded(SPRING * (load + 0.3 * late), load))
     assert found.verdict != "time_lag"
+
+
+@pytest.mark.parametrize("begins", ["at rest", "in full swing"])
+def test_what_a_late_channel_showed_before_is_told_by_its_first_readings(begins: str) -> None:
+    """As far behind as later on where the rig swung already: first readings are no drift."""
+    time = np.arange(6000) / 100.0
+    shift = 20.0 if begins == "in full swing" else 0.0
+
+    def load(t: Array) -> Array:
+        ramp = np.clip((t + shift - 5.0) / 5.0, 0.0, 1.0)
+        return np.asarray(100.0 * ramp * np.sin(2 * np.pi * 0.3 * (t + shift - 5.0)))
+
+    data = replace(recorded(SPRING * load(time - 0.03), load(time)), time=time)
+    bench = make_bench(data)
+    way, speed = steady_way(bench, bench.line)
+    swings = begins == "in full swing"
+    assert bool(np.any(speed != 0)) is swings
+    assert bool(np.any(way != 0)) is swings
+    n = bench.rows.n
+    shown = SPRING * bench.load + lagged(bench, "displacement", "delay", 0.03)[:n]
+    left = bench.response - shown
+    assert np.abs((left - left.mean())[:10]).max() < 5 * NOISE_M

@@ -28,6 +28,7 @@ from identification.gap.laws.closer import (
     shows,
 )
 from identification.gap.laws.effect import Effect
+from identification.gap.laws.in_swing import steady_way
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
@@ -134,8 +135,7 @@ def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
 
 def _like_a_soft_start(bench: Bench) -> bool:
     """Without an arm one reading a step, and every run goes one way: a lag would be but a step's
-    worth of datum, and what the first reading lacks. Of an arm, a hand on the screw takes another
-    time for every step, and that shows."""
+    worth of datum. Of an arm, a hand on the screw takes another time for every step."""
     rows = bench.rows
     if bench.data.arm or rows.continuous or not rows.hold_starts.all():
         return False
@@ -148,7 +148,9 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     loads; the one that is driven was in truth ahead of what was read."""
     if channel != _driven(bench):
         line = _parabolas(bench, bench.line)
-        return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
+        way, speed = steady_way(bench, line)  # of which a lag shows what was that long ago
+        shown = _behind(bench, (line - way)[:, None], kind, lag)[:, 0]
+        return bench.stacked(shown + way - speed * lag - line)
     if _way_shown(bench):
         ahead = _ahead(bench, _parabolas(bench, bench.load), kind, lag)
     else:
@@ -207,9 +209,8 @@ _NOISE = 4.0  # standard deviations, by second differences
 
 def _parabolas(bench: Bench, values: Array) -> Array:
     """Parabolas (n,) through the rows about each of a running recording (Savitzky and Golay 1964):
-    noise of what is driven is in the response as well, and must not stand in the column that is to
-    explain it; a fast swing is to keep its height. Where they are far from what was read, as about
-    a step, it was no noise, and stays."""
+    noise of what is driven must not stand in the column that is to explain it. Where they are far
+    from what was read, as about a step, it was no noise, and stays."""
     if not bench.rows.continuous:
         return values
     out = values.copy()
