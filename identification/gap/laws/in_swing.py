@@ -15,6 +15,7 @@ from identification.arrays import Array
 from identification.gap.model.bench import Bench
 
 _FIRST, _FEWEST = 3, 30  # rows that tell; of a run that is worth a look
+_PLAINLY = 3.0  # standard uncertainties of a sample
 
 
 def steady_way(bench: Bench, line: Array) -> tuple[Array, Array]:
@@ -32,8 +33,11 @@ def steady_way(bench: Bench, line: Array) -> tuple[Array, Array]:
         behind = bench.response[a:b] - x
         A = np.column_stack([np.ones(b - a), x, speed])
         w = np.linalg.lstsq(A, behind, rcond=None)[0]
-        moving, resting = (behind - A[:, :k] @ w[:k] for k in (3, 2))
-        if w[2] < 0 and np.sum(moving[:_FIRST] ** 2) < np.sum(resting[:_FIRST] ** 2):
+        moving, resting = (
+            float(np.mean((behind - A[:, :k] @ w[:k])[:_FIRST] ** 2)) for k in (3, 2)
+        )
+        plainly = resting > (_PLAINLY * bench.noise.stated) ** 2
+        if w[2] < 0 and plainly and moving < resting / 2:
             speeds[a:b] = speed[:_FIRST].mean()
             way[a:b] = speeds[a:b] * (time - time[0])
     return way, speeds
