@@ -63,13 +63,12 @@ _LOST = "stiffness lost beyond the threshold, over the elastic one; 1: none is l
 def parameter_meanings(r: GapResult) -> dict[str, str]:
     """Parameter -> what its number is, of those found that need it. Of a rig without an arm whose
     displacement is imposed, springs and friction are stiffnesses beside each other."""
-    found, told = {name for e in r.effects for name in e.parameters}, {}
-    beside = r.bench.imposed and not r.bench.data.arm
-    if _SHARE in found:
-        told[_SHARE] = _STIFFER if beside else _HELD_BACK
-    if _BEYOND in found:
-        told[_BEYOND] = _LOST if beside else _ADDED
-    return told
+    found = {name for e in r.effects for name in e.parameters} & {_SHARE, _BEYOND}
+    if not found:
+        return {}
+    beside = not r.bench.data.arm and r.bench.imposed
+    each = {_SHARE: _STIFFER, _BEYOND: _LOST} if beside else {_SHARE: _HELD_BACK, _BEYOND: _ADDED}
+    return {name: told for name, told in each.items() if name in found}
 
 
 # What is said in place of a word's meaning.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import GapData
+from identification.gap.data import CYCLE, GapData
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
@@ -53,3 +53,22 @@ def test_how_far_friction_gives_way_is_known_as_far_as_readings_show_it(
     share = parameters["share_through_friction"]
     assert share.low < SHARE < share.high <= 1.0
     assert 0.005 < share.high - share.low < widest
+
+
+@pytest.mark.parametrize("stiff", [100e3, 400e3, 4000e3])
+def test_friction_far_stiffer_than_the_spring_beside_it_is_friction(stiff: float) -> None:
+    """A slider of 8 N beside a spring, on strokes to and fro: neither a lag nor a yield."""
+    n, spring = 1600, 62e3  # N/m
+    u = 1e-3 * np.sin(2 * np.pi * np.arange(n) / 200)
+    held = np.zeros(n)
+    for i in range(1, n):
+        held[i] = np.clip(held[i - 1] + stiff * (u[i] - u[i - 1]), -FRICTION, FRICTION)
+    rng = np.random.default_rng(1)
+    force = spring * u + held + rng.normal(0, 0.3, n)
+    read = u + rng.normal(0, 1e-6, n)
+    data = bench_data(force, read, step=np.full(n, -1), branch=np.full(n, CYCLE))
+    meter = replace(data.instruments, force=0.3, displacement=1e-6)
+    data = replace(data, compliance=np.array([1 / 60e3]), instruments=meter)
+    found = explained(replace(data, imposed="displacement", time=np.arange(n) / 20.0))
+    assert found.verdict == "joint_hysteresis"
+    assert found.effects[0].parameters["friction"].value == pytest.approx(FRICTION, rel=0.06)

@@ -104,8 +104,8 @@ class GapResult:
     def hidden(self) -> bool:
         """A gap that no effect explains, if there is one, is no more than readings scatter, which
         is far more than was stated."""
-        lost = self.verdict == "unknown" and self.bench.noise.misjudged
-        return lost and self.after <= _NOISE_TO * self.noise
+        lost = self.verdict == "unknown" and self.after <= _NOISE_TO * self.noise
+        return lost and self.bench.noise.misjudged
 
     @property
     def learned_nothing(self) -> bool:

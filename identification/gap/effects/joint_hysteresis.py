@@ -69,6 +69,7 @@ SCALES = friction_forms.SCALES  # of all its shapes
 # Friction beside a spring that is imposed a motion may be stiffer than it by any factor, until it
 # slips: seals, brushes and sliders give way by micrometres.
 STIFF = (0.0007, 0.002, 0.005)
+WITH_STIFF = (*STIFF, *RADII)
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends all at once, at a large load, is a knee; what
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
@@ -158,9 +159,9 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         reach /= NEARER if found.info["law"] in BY_LOAD else 1.0
         finer = _exponential(bench, joint, name, reach / span, path)
     elif not bench.data.arm and bench.course.unloads:
-        every = _strengths(bench)  # loops of thousands of readings tell those between apart, too
-        between = [(a * b) ** 0.5 for a, b in pairwise(every)]
-        finer = _spectra(bench, joint, name, span, path, tuple(sorted((*every, *between))))
+        finer = _spectra(bench, joint, name, span, path, _between(RADII))
+        if bench.imposed:
+            finer += _spectra(bench, joint, f"{name} stiff", span, path, _between(WITH_STIFF))
     else:
         return []
     out = [v.known_by(" fine", memory=memory, closely=True) for v in finer]
@@ -209,6 +210,9 @@ def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> lis
     name = f"joint {joint + 1}{memory}"
     spectra = _spectra(bench, joint, name, span, path)
     found = spectra + [v for s in spectra for v in _pairs(bench, name, span, s, len(spectra))]
+    if bench.imposed and not bench.data.arm:
+        (stiff,) = _spectra(bench, joint, f"{name} stiff", span, path, WITH_STIFF)
+        found += [stiff, *_pairs(bench, name, span, stiff, 1)[: len(STIFF)]]
     if not bench.course.once:  # a curve that saturates would be taken for friction
         reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
         found += _exponential(bench, joint, name, reaches, path)
@@ -223,15 +227,14 @@ def _spectra(
     name: str,
     span: float,
     path: Path,
-    strengths: tuple[float, ...] = (),
+    strengths: tuple[float, ...] = RADII,
 ) -> list[Variant]:
     """The whole spectrum of strengths, which holds back what the spring would deflect; on an arm
     also where the stated spring is that of small loads, which make nothing slip: then every element
     adds its play (Prandtl 1928)."""
     torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    seen = strengths or (ARM_RADII if bench.data.arm else _strengths(bench))
-    seen = seen if bench.data.arm or bench.course.unloads else seen[:_SMALL]
-    radius = span * np.array(seen)
+    seen = strengths if bench.course.unloads else strengths[:_SMALL]
+    radius = span * np.array(ARM_RADII if bench.data.arm else seen)
     radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)
     slips = path.plays(radius)
@@ -247,9 +250,9 @@ def _spectra(
     return out
 
 
-def _strengths(bench: Bench) -> tuple[float, ...]:
-    """Strengths that a specimen's friction may slip at, of its range."""
-    return (*STIFF, *RADII) if bench.imposed else RADII
+def _between(strengths: tuple[float, ...]) -> tuple[float, ...]:
+    """With those between: loops of thousands of readings tell them apart."""
+    return tuple(sorted((*strengths, *((a * b) ** 0.5 for a, b in pairwise(strengths)))))
 
 
 def _pairs(bench: Bench, name: str, span: float, whole: Variant, conventions: int) -> list[Variant]:
