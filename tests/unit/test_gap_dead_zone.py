@@ -12,6 +12,7 @@ import pytest
 from scipy.special import erf
 
 from identification.arrays import Array
+from identification.gap.effects import joint_hysteresis
 from identification.gap.evidence.engine import Engine
 from identification.gap.judging.dead_zone import (
     CURVE,
@@ -22,6 +23,7 @@ from identification.gap.judging.dead_zone import (
     has_dead_zone,
     spoken_for,
 )
+from identification.gap.laws.friction_forms import RADII
 from identification.gap.model.bench import Bench, KnownEffects
 from tests.explained import explained
 from tests.unit.small_explanations import part, said, small_engine_of
