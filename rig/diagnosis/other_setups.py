@@ -57,7 +57,7 @@ def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]
     reach = float(np.hypot(here[0, 3], here[1, 3]))
     share = min(_NEARER_M, 0.4 * reach) / max(reach, 1e-9)
     near[:2, 3] *= 1 - share
-    floor, out = min(_lowest(arm, q), _CLEAR_M), {}
+    floor, out = min(_lowest(arm, q), _CLEAR_M) - _ROUNDING_M, {}
     found = _nearest(arm, near @ np.linalg.inv(tool), q, floor)
     if found is not None:
         text = (
@@ -68,7 +68,7 @@ def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]
     turned = [
         p
         for p in solutions(arm, here @ np.linalg.inv(tool), float(q[5])).values()
-        if p[2] * q[2] < 0 and _lowest(arm, p) >= floor - _ROUNDING_M
+        if p[2] * q[2] < 0 and _lowest(arm, p) >= floor
     ]
     if turned:
         best = min(turned, key=lambda p: float(np.abs(_wrapped(p - q)).max()))
@@ -87,7 +87,7 @@ def _lowest(arm: Arm, q: Array) -> float:
 
 def _nearest(arm: Arm, flange: Array, q: Array, floor: float) -> Array | None:
     each = solutions(arm, flange, float(q[5])).values()
-    found = [p for p in each if _lowest(arm, p) >= floor - _ROUNDING_M]
+    found = [p for p in each if _lowest(arm, p) >= floor]
     if not found:
         return None
     return min(found, key=lambda p: float(np.abs(_wrapped(p - q)).max()))

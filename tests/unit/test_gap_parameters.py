@@ -417,20 +417,6 @@ def test_friction_means_the_same_in_both_conventions(label: str) -> None:
     assert held["share_through_friction"].value == pytest.approx(0.3, rel=0.02)
 
 
-@pytest.mark.parametrize("law", ["Dahl", "Bouc-Wen"])
-def test_what_bends_from_the_first_load_on_rubs_however_far_it_reaches(law: str) -> None:
-    """Dahl's friction is never all there; at a load of its reach it is by 0.63."""
-    bench = make_bench(arm_data())
-    rubs = of(bench, "joint_hysteresis", f"joint 1 {law} 0.5")
-    joint = int(rubs.info["joint"])
-    largest = float(np.abs(bench.torque[:, joint]).max())
-    long = replace(rubs, info={**rubs.info, "radius": np.full(2, largest)})
-    w = np.array([0.3, 0.0])
-    found = parameters(bench, Part(long, 1.0), w, no_spread(w), NOMINAL)
-    assert found["share_through_friction"].value == pytest.approx(0.3 * (1 - np.exp(-1)))
-    assert found["friction"].value == pytest.approx(0.3 * (1 - np.exp(-1)) * largest)
-
-
 def test_friction_is_over_the_spring_that_was_found() -> None:
     """Half the compliance that META states, and what rubs has 0.3 of META's: twice the friction."""
     bench = make_bench(arm_data())

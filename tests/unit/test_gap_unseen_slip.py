@@ -1,4 +1,5 @@
-"""Friction that slips before the first reading after a turn."""
+"""Numbers of friction that readings hardly resolve: it slips before the first one after a turn, or
+bends over more than the load."""
 
 from __future__ import annotations
 
@@ -7,9 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.answer.parameters import parameters
 from identification.gap.data import CYCLE, GapData
+from identification.gap.evidence.parts import Part
+from identification.gap.laws.interval import NOMINAL
+from identification.gap.model.bench import make_bench
 from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
+from tests.unit.test_gap_parameters import no_spread, of
 
 SPRING, STIFF, FRICTION = 95e3, 300e3, 8.0  # N/m until it slips, beside the spring; N
 SHARE = STIFF / (SPRING + STIFF)  # of the compliance, what friction holds back until it slips
@@ -48,9 +55,9 @@ def test_how_far_friction_gives_way_is_known_as_far_as_readings_show_it(
     """In steps of 20 N it has slipped by the next reading: anything up to all is possible."""
     found = explained(rubbing(step_N))
     assert found.verdict == "joint_hysteresis"
-    parameters = found.effects[0].parameters
-    assert parameters["friction"].value == pytest.approx(FRICTION, rel=0.05)
-    share = parameters["share_through_friction"]
+    numbers = found.effects[0].parameters
+    assert numbers["friction"].value == pytest.approx(FRICTION, rel=0.05)
+    share = numbers["share_through_friction"]
     assert share.low < SHARE < share.high <= 1.0
     assert 0.005 < share.high - share.low < widest
 
@@ -72,3 +79,17 @@ def test_friction_far_stiffer_than_the_spring_beside_it_is_friction(stiff: float
     found = explained(replace(data, imposed="displacement", time=np.arange(n) / 20.0))
     assert found.verdict == "joint_hysteresis"
     assert found.effects[0].parameters["friction"].value == pytest.approx(FRICTION, rel=0.06)
+
+
+@pytest.mark.parametrize("law", ["Dahl", "Bouc-Wen"])
+def test_what_bends_from_the_first_load_on_rubs_however_far_it_reaches(law: str) -> None:
+    """Dahl's friction is never all there; at a load of its reach it is by 0.63."""
+    bench = make_bench(arm_data())
+    rubs = of(bench, "joint_hysteresis", f"joint 1 {law} 0.5")
+    joint = int(rubs.info["joint"])
+    largest = float(np.abs(bench.torque[:, joint]).max())
+    long = replace(rubs, info={**rubs.info, "radius": np.full(2, largest)})
+    w = np.array([0.3, 0.0])
+    found = parameters(bench, Part(long, 1.0), w, no_spread(w), NOMINAL)
+    assert found["share_through_friction"].value == pytest.approx(0.3 * (1 - np.exp(-1)))
+    assert found["friction"].value == pytest.approx(0.3 * (1 - np.exp(-1)) * largest)

@@ -170,9 +170,9 @@ def _by_eye(pair: tuple[str, str]) -> NextMeasurement | None:
 
 _OF_THE_STAND = frozenset({"base_slip", "base_compliance"})
 _LOOK_AT_THE_STAND = (
-    "No procedure of this rig is expected to tell them apart: both move the arm alike wherever it "
-    "stands, and no joint reading looks past its gear. A dial gauge, or the laser, against the "
-    "foot of the arm shows whether that moves."
+    "No procedure of this rig is expected to tell them apart: both move the arm alike, as far as "
+    "its channels see. A dial gauge, or the laser, against the foot of the arm shows whether that "
+    "moves."
 )
 
 

@@ -278,7 +278,7 @@ def _unsure(bench: Bench, direction: str, k: int, softer: Softer) -> float:
             turns = s.tangent_lever[k] * bench.compliance  # rad/N
             tells += turns**2 * ((s.lever / noise.stated) ** 2 + reads**2)
     share = tells / max(float(tells.sum()), _TINY)
-    return sum(float(share[j]) ** 2 * v for j, v in softer.variance.items() if j < len(share))
+    return sum(float(share[j]) ** 2 * v for j, v in softer.variance.items())
 
 
 _TINY = 1e-300

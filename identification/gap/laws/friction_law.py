@@ -211,7 +211,7 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
     beside = bench.imposed and not bench.data.arm  # of the spring: a force, as it is
     most, unit = np.inf if beside else 1.0, bench.torque_unit
     hidden = slips * np.clip(1 - radius / max(_seen_from(bench, joint), _TINY), 0.0, 1.0)
-    share = _between(
+    share = _bounded(
         found.per_spring(slips, joint), found.per_spring(slips - hidden, joint).value, most
     )
     if beside:
@@ -221,7 +221,7 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
     return {"friction": friction, "share_through_friction": share}
 
 
-def _between(share: Parameter, least: float, most: float) -> Parameter:
+def _bounded(share: Parameter, least: float, most: float) -> Parameter:
     """A share that may be as small as `least`, no larger than `most`: what was found, or, where it
     can't be that and may be less, anywhere between (GUM 4.3.7)."""
     if share.value <= most or least >= most:

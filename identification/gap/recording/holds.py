@@ -79,11 +79,9 @@ def scatter_within(values: Array, hold: Ints, comes: Array | None = None) -> flo
     0.8713). Of holds that settle, in their later parts. None where there are too few, or most of
     them goes by the way that a hold was come to; comes (n,): what tells that, if not the values."""
     part = _late(hold, _FOUR) if _settles(values, hold) else hold
-    return (
-        None
-        if _goes_on(values, part, values if comes is None else comes)
-        else _trimmed(_second(values, part)[0])
-    )
+    if _goes_on(values, part, values if comes is None else comes):
+        return None
+    return _trimmed(_second(values, part)[0])
 
 
 def _settles(values: Array, hold: Ints) -> bool:

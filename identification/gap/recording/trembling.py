@@ -41,9 +41,9 @@ def force_as_it_scatters(data: GapData) -> GapData:
     alone, stated = scatter**2 - shared / moves, data.instruments.force
     if alone - _SURELY * error / moves < (_MORE * stated) ** 2:
         return data
-    ratio = alone**0.5 / stated
-    meter = replace(data.instruments, force=ratio * stated)
-    return replace(data, instruments=meter, force_scatters=ratio)
+    noise = alone**0.5
+    meter = replace(data.instruments, force=noise)
+    return replace(data, instruments=meter, force_scatters=noise / stated)
 
 
 def _per_newton(data: GapData) -> float:
