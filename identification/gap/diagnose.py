@@ -26,6 +26,7 @@ from identification.gap.judging.leftover import looked_up
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
+from identification.gap.recording.digits import as_fine_as_digits
 from identification.gap.recording.ends import without_ends
 from identification.gap.recording.glitches import without_glitches
 from identification.gap.recording.ramps import ramps_told
@@ -75,7 +76,7 @@ def explain_gap(
     withheld, forced = set(withhold), frozenset(add)
     check_words(withheld | forced)
     tell("preparing", 0.0)
-    told = force_as_it_scatters(ramps_told(data))
+    told = force_as_it_scatters(ramps_told(as_fine_as_digits(data)))
     bench = make_bench(without_slack(without_glitches(without_ends(told))))
     engine, variants = _prepared(bench, known, withheld)
     _check_shown(forced, variants)

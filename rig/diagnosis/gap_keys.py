@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.gap.effects import base_slip, contact_seating, time_lag
+from identification.gap.effects import base_slip, contact_seating, joint_creep, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.laws import lost_motion
 from identification.gap.laws.friction_law import FRICTION_LAWS, SLIP_AT_A_STRENGTH
@@ -48,6 +48,7 @@ CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),
     "memory": _MEMORY,
     "forgets": Key("memory", "text", options=(ANEW,)),
+    joint_creep.STOOD_ON: Key(joint_creep.STOOD_ON, "positive"),
     "flow_time": Key("flow_time_s", "size"),
     "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=tuple(base_slip.AXES)),
@@ -159,6 +160,7 @@ MAY_BE_MISSING = (
     "flow_exponent",
     "placed",
     "forgets",
+    joint_creep.STOOD_ON,
     "only_in",
     "unread",
 )
@@ -251,7 +253,7 @@ GRAMMAR: dict[str, Grammar] = {
         ),
     ),
     "joint_creep": Grammar(
-        ("joint", "forgets"),
+        ("joint", "forgets", joint_creep.STOOD_ON),
         (
             ("compliance", ("retardation_time",)),
             ("compliance_quadratic", ("retardation_time",)),

@@ -22,6 +22,9 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array, Flags
+from identification.gap.evidence.compare import closest
+from identification.gap.evidence.parts import Part
+from identification.gap.laws.closer import Word, closing_in, estimate, places, shows
 from identification.gap.laws.curves import BENT_SLOPE
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, factors
@@ -107,11 +110,18 @@ def _memories(bench: Bench) -> dict[str, Flags | None]:
 
 
 def _elements(
-    bench: Bench, joint: int, times_s: Array, fresh: Flags | None, *, is_bent: bool = False
+    bench: Bench,
+    joint: int,
+    times_s: Array,
+    fresh: Flags | None,
+    *,
+    is_bent: bool = False,
+    stood: float = 0.0,
 ) -> list[int]:
-    """Column of an element of every time (k,)."""
+    """Column of an element of every time (k,). stood: as in `phases_of`."""
     load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times_s)))
-    z = retarded(signed_squares(load) if is_bent else load, times_s, bench.rows, bench.rest, fresh)
+    load = signed_squares(load) if is_bent else load
+    z = retarded(load, times_s, bench.rows, bench.rest, fresh, stood)
     unit = bench.sense * bench.compliance[joint] * in_a_run(bench, times_s)
     return [bench.add_joint(joint, y) for y in (unit * z).T]
 
@@ -140,20 +150,85 @@ def _family(
             **info,
         )
     ]
-    for k in range(len(columns) - 1):
-        out.append(
-            variant(
-                WORD,
-                f"{name} T {times_s[k]:.3g} s",
-                columns[k : k + 2],
-                sizes,
-                prior=pairs / (len(columns) - 1),
-                each=True,
-                times_s=times_s[k : k + 2],
-                **info,
-            )
+    return out + _pairs(name, columns, times_s, sizes, pairs, info)
+
+
+def _pairs(
+    name: str,
+    columns: list[int],
+    times_s: Array,
+    sizes: tuple[float, ...],
+    prior: float,
+    info: dict[str, Any],
+) -> list[Variant]:
+    """Each time with its neighbour."""
+    return [
+        variant(
+            WORD,
+            f"{name} T {times_s[k]:.3g} s",
+            columns[k : k + 2],
+            sizes,
+            prior=prior / (len(columns) - 1),
+            each=True,
+            times_s=times_s[k : k + 2],
+            **info,
         )
+        for k in range(len(columns) - 1)
+    ]
+
+
+def refined(bench: Bench, found: Variant, _: float = 1.0) -> list[Variant]:
+    """Pairs of times that lie closer together, about a pair that was found. One time between two of
+    the grid is met by these to one or two percent of what creeps, which a good laser sees."""
+    low, high = found.times_s
+    between = np.log(min(high / low, _SEEN_TO)) / np.log(STEP)
+    times_s = low * STEP ** np.arange(-1, round(between) + 2)
+    joint, memory = int(found.info["joint"]), str(found.info["memory"])
+    is_bent, fresh = bool(found.info["bent"]), bench.rebuilt if memory else None
+    shares = STOOD if _unloads_unseen(bench) else STOOD[:1]
+    prior, out = _FINE_PRIOR * found.prior / len(shares), list[Variant]()
+    for stood in shares:
+        name = f"joint {joint + 1}{' ' * bool(memory)}{memory}{BENT * is_bent} fine"
+        name += f" stood on for {stood:g} of the rest" * (stood > 0)
+        info = {"joint": joint, "memory": memory, "bent": is_bent, "stood": stood}
+        columns = _elements(bench, joint, times_s, fresh, is_bent=is_bent, stood=stood)
+        out += _pairs(name, columns, times_s, found.scales, prior, info)
     return out
+
+
+def _unloads_unseen(bench: Bench) -> bool:
+    """Whether loads were taken off between two runs, and nobody saw when."""
+    rests = np.flatnonzero(bench.rest[1:]) + 1
+    return bool(np.any(np.abs(bench.load[rests - 1]) > _LOADED * np.abs(bench.load).max()))
+
+
+_LOADED = 0.2  # of the largest load, from which a last reading is no longer one without
+STOOD_ON = "share_of_rest_stood_on"  # in the constants of a law
+STOOD = (0.0, 0.5, 1.0)  # shares of such a rest for which the load stood on
+STEP = 3.0**0.25  # from time to time of a closer look
+_SEEN_TO = 9.0  # times the last time that ends, up to where flowing is one with it
+_FINE_PRIOR = 1.5  # of them all, over that of the pair, of which they reach over one and a half
+
+
+def _look_closer(word: Word) -> list[Variant]:
+    """About the best pairs, at every joint that they may sit in: where joints look alike, that one
+    was looked at more closely is no evidence."""
+    if not shows(word):
+        return []
+    best = places(word.alone, word.beside, lambda v: len(v.times_s) == 2, most=6)
+    first = closest(word.families[word.ranked[0]])
+    beside = () if first.variant.word == WORD else (Part(first.variant, first.scale),)
+    closer = closing_in(word, refined, best)
+    return [v for v in closer if _grows(estimate(word.engine, v, beside).coefficients)]
+
+
+def _grows(coefficients: Array) -> bool:
+    """Whether elements (k,) only creep. Of two times as close to each other as here one may go back
+    nearly as much as the other creeps, and both together do what no spectrum does."""
+    return bool(coefficients.min() > -_BACK * coefficients.max())
+
+
+_BACK = 0.05
 
 
 BENT = " more than in proportion"
@@ -202,8 +277,9 @@ def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         name, unit = "compliance_quadratic", unit / float(np.abs(bench.true_torque[:, joint]).max())
     times = np.asarray(v.info["times_s"])
     terms = tuple(Term(name, {"retardation_time": float(t)}) for t in times)
-    forgets = {"forgets": ANEW} if v.info["memory"] else {}
-    return Law({"joint": joint} | forgets, terms), unit * in_a_run(bench, times)
+    more: dict[str, Any] = {"forgets": ANEW} if v.info["memory"] else {}
+    more |= {STOOD_ON: v.info["stood"]} if v.info.get("stood") else {}
+    return Law({"joint": joint} | more, terms), unit * in_a_run(bench, times)
 
 
 def _columns(bench: Bench, law: Law) -> list[Array]:
@@ -214,7 +290,8 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     torque = bench.true_torque[:, joint][:, None]
     load = np.where(bent, torque * np.abs(torque), torque)
     fresh = bench.rebuilt if law.constants.get("forgets") == ANEW else None
-    z = retarded(load, times, bench.rows, bench.rest, fresh)
+    stood = float(law.constants.get(STOOD_ON, 0.0))
+    z = retarded(load, times, bench.rows, bench.rest, fresh, stood)
     return [bench.joint_column(joint, bench.sense * column) for column in z.T]
 
 
@@ -224,6 +301,6 @@ EFFECT = Effect(
     parameters=_parameters,
     laws=Laws(_describe, _columns),
     lengths=("creep_fraction", "creep_fraction_of_run"),
-    finer=None,
+    finer=_look_closer,
     not_negative=("creep_fraction", "creep_fraction_of_run"),
 )

@@ -123,22 +123,26 @@ def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) ->
     """What is most probable with a variant whose columns the engine may not know yet, beside other
     parts."""
     levels, energy = conditioned(engine, beside)
-    eta = engine.levels[score(engine, levels, [variant], energy)[0].level].eta
-    fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))
+    best = score(engine, levels, [variant], energy)[0]
+    eta, parts = engine.levels[best.level].eta, (Part(variant, best.scale), *beside)
+    fitted = fit(engine, Explanation(parts, 0.0, eta, (0.0,), 0.0))
     softer = engine.base.softer(fitted.base, engine.bench.data.joints)
     return Estimate(fitted.of(0)[0], softer, float(eta))
 
 
 def places(
-    alone: list[Scored], beside: list[Scored], able: Callable[[Variant], bool] = lambda _: True
+    alone: list[Scored],
+    beside: list[Scored],
+    able: Callable[[Variant], bool] = lambda _: True,
+    most: int = _REFINED,
 ) -> list[Scored]:
-    """The best of the _REFINED best joints, or axes, beside the leading word, and the best alone:
+    """The best of the `most` best joints, or axes, beside the leading word, and the best alone:
     of two words that explain the same neither has a place beside the other. able: of those."""
     by_place: dict[object, Scored] = {}
     first = [s for s in alone if able(s.variant)][:1]
     for s in (s for s in beside or alone if able(s.variant)):
         by_place.setdefault(place_of(s.variant), s)
-    found = [*first, *list(by_place.values())[:_REFINED]]
+    found = [*first, *list(by_place.values())[:most]]
     return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]
 
 

@@ -38,7 +38,7 @@ def flowing_play(
     below, above = centre - radius, centre + radius
     hung = clipped(0.0, below, above)
     begins = beginnings(fresh)
-    before = np.where((begins | rests(rows))[:, None], 0.0, np.roll(load, 1, axis=0))
+    before = np.where(begins[:, None], 0.0, np.roll(load, 1, axis=0))
     steps = _steps(rows, begins)
     squared = np.broadcast_to(np.asarray(square, dtype=bool), k)
     states, state = np.empty((len(steps.row), k)), hung[0]
@@ -67,8 +67,8 @@ class _Steps:
 
 
 def _steps(rows: Rows, begins: Flags) -> _Steps:
-    """A rest, the old load, the way to the new one in parts, the new load; where memory begins
-    (n,), there is no rest, and one step at least."""
+    """The old load, a rest, the way to the new one in parts, the new load; where memory begins
+    (n,), there is neither of the first two, and one step at least."""
     rest = rests(rows)
     phases, every = phases_of(rows, rest), np.arange(rows.n)
     parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
@@ -77,9 +77,9 @@ def _steps(rows: Rows, begins: Flags) -> _Steps:
     old, new = _on_the_way(share, rows.overshoot[way])
     none, one = np.zeros(rows.n), np.ones(rows.n)
     kinds = (
+        (every, np.where(begins, 0.0, phases.pause), one, none),
         (every, np.where(begins, 0.0, phases.unloaded), none, none),
-        (every, phases.pause, one, none),
-        (way, phases.ramp[way] / parts[way], old, new),
+        (way, phases.ramp[way] / parts[way], np.where(rest[way], 0.0, old), new),
         (every, phases.stands, none, one),
     )
     row, seconds, old, new = (np.concatenate(each) for each in zip(*kinds, strict=True))

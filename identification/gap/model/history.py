@@ -140,36 +140,45 @@ def _let_go(
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Seconds (n,) since the row before, in all, and of these: nothing is loaded, the old load
-    stands on, the load ramps, it stands. After a rest only the last of it is ramp."""
+    """Seconds (n,) since the row before, in all, and of these in their order: the old load stands
+    on, nothing is loaded, the load ramps, it stands. After a rest only the last of it is ramp."""
 
     step: Array
-    unloaded: Array
     pause: Array
+    unloaded: Array
     ramp: Array
     stands: Array
 
 
-def phases_of(rows: Rows, rest: Flags) -> Phases:
-    """Of every row; rest (n,): before which the load went back to zero."""
+def phases_of(rows: Rows, rest: Flags, stood: float = 0.0) -> Phases:
+    """Of every row; rest (n,): before which the load went back to zero. stood: share of a rest for
+    which the old load stood on, which no row shows."""
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
-    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
-    return Phases(step, step - ease, pause, np.maximum(ease - stands - pause, 0.0), stands)
+    pause = np.minimum(standing_on(rows), np.where(rest, step - ease, ease - stands))
+    pause += np.where(rest, stood * (step - ease - pause), 0.0)
+    ramp = np.maximum(ease - stands - np.where(rest, 0.0, pause), 0.0)
+    return Phases(step, pause, np.where(rest, step - ease - pause, 0.0), ramp, stands)
 
 
 def retarded(
-    load: Array, times: Array, rows: Rows, rest: Flags, fresh: Flags | None = None
+    load: Array,
+    times: Array,
+    rows: Rows,
+    rest: Flags,
+    fresh: Flags | None = None,
+    stood: float = 0.0,
 ) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,), or one (1,) for all:
     deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps
-    between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten."""
-    before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
-    before[rest] = 0.0
-    phases = phases_of(rows, rest)
-    # z_i = keep_i z_{i-1} + gain_i: a rest, or the old load standing on; a ramp to the new load,
-    # then standing there. What there was goes back all the while.
+    between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten.
+    stood: as in `phases_of`."""
+    old = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
+    before = np.where(rest[:, None], 0.0, old)
+    phases = phases_of(rows, rest, stood)
+    # z_i = keep_i z_{i-1} + gain_i: the old load standing on, a rest; a ramp to the new load, then
+    # standing there. What there was goes back all the while.
     paused = np.exp(-phases.pause[:, None] / times)
     ramp = phases.ramp[:, None] / times
     held = np.exp(-phases.stands[:, None] / times)
@@ -184,8 +193,8 @@ def retarded(
     keep = np.exp(-phases.step[:, None] / times)
     if fresh is not None:
         keep[fresh] = 0.0
-    stood = during * before * (1 - paused)
-    return _prefix(keep, held * (ramped + stood) + load * (1 - held))
+    during *= np.exp(-phases.unloaded[:, None] / times)
+    return _prefix(keep, held * (ramped + during * old * (1 - paused)) + load * (1 - held))
 
 
 def _ramped(before: Array, after: Array, ramp: Array) -> Array:

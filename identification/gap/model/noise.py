@@ -73,7 +73,10 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     fallback = np.hypot(meter.displacement, slope * meter.force)
     hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
-    common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
+    of_force = np.maximum(
+        meter.force / np.sqrt(rows.hold_weight), _rounded(data.force, meter.force, hold)
+    )
+    common = np.where(rows.steady, steep * of_force, 0.0)
     whites = _whites(data) if rows.continuous else (0.0, 0.0)
     if rows.continuous:
         per_sample, common = _running(data, rows, slope, imposed, whites), np.zeros(rows.n)
@@ -101,7 +104,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         less = data.displacement - float(np.median(slope)) * data.force
         follows = _scatter(data, less, hold)
         raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
-    rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
+    rounded = 0.0
+    if not (rows.continuous or imposed):
+        rounded = _rounded(data.displacement, meter.displacement, hold)
     readings = readings_of(data, rows, hold)
     per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
     return Noise(
@@ -151,16 +156,16 @@ _LITTLE = 2.0  # times what is stated: what scatters more was misjudged
 _ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
 
 
-def _rounded(data: GapData, hold: Ints) -> float:
-    """What all readings of a hold are off by together (m) because the sensor rounds them, and
-    scatters by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
+def _rounded(values: Array, stated: float, hold: Ints) -> float:
+    """What all readings (n,) of a hold are off by together because the sensor rounds them, and they
+    scatter by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
     stated of one; 0 where they scatter."""
-    u, again = data.displacement, np.diff(hold) == 0
-    if again.sum() < ENOUGH or np.mean(np.diff(u)[again] == 0) < _ONE_NUMBER:
+    again = np.diff(hold) == 0
+    if again.sum() < ENOUGH or np.mean(np.diff(values)[again] == 0) < _ONE_NUMBER:
         return 0.0
-    steps = np.diff(np.unique(u))
-    real = steps[steps > _SAME * float(np.ptp(u))]
-    return min(float(real.min(initial=np.inf)) / 12**0.5, data.instruments.displacement)
+    steps = np.diff(np.unique(values))
+    real = steps[steps > _SAME * float(np.ptp(values))]
+    return min(float(real.min(initial=np.inf)) / 12**0.5, stated)
 
 
 _SAME = 1e-9  # of the range: digits that a conversion of units leaves

@@ -1,0 +1,84 @@
+"""Digits that are coarser than what was stated of a channel.
+
+Whoever reads a whole number of steps is off by a step over the root of 12, whatever else was stated
+of the instrument (GUM F.2.2.1): a range that is too large for its converter, a display that was
+copied. What is left then goes up and down with the digits, as waves and bends of the curve do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.gap.data import GapData
+
+_FEWEST = 6  # values that tell a lattice
+_MULTIPLE = 0.05  # of a step by which a value may be off the lattice: conversions round, too
+_SAME = 1e-9  # of the range: digits that a conversion of units leaves
+
+
+def as_fine_as_digits(data: GapData) -> GapData:
+    """The data with an uncertainty of force and displacement that their digits allow; as they are
+    where these are fine enough."""
+    meter, notes = data.instruments, list[str]()
+    for channel, unit, per_unit in (("force", "N", 1.0), ("displacement", "mm", 1e-3)):
+        values, stated = getattr(data, channel), getattr(meter, channel)
+        step = step_of(values)
+        drives = channel == ("displacement" if data.imposed == "displacement" else "force")
+        if drives and _may_be_set(values, step):
+            continue
+        if (least := step / 12**0.5) > stated:
+            meter = replace(meter, **{channel: least})
+            notes.append(
+                f"The {channel} is read in steps of {step / per_unit:.3g} {unit}, which nobody "
+                f"knows to better than {least / per_unit:.2g} {unit}, but {stated / per_unit:.2g} "
+                f"{unit} is stated. It was taken as uncertain as its digits leave it."
+            )
+    return replace(data, instruments=meter, notes=(*data.notes, *notes)) if notes else data
+
+
+def _may_be_set(values: Array, step: float) -> bool:
+    """Whether values (n,) of what drives may be its levels, as somebody set or weighed them, rather
+    than readings: large steps, or a few round numbers."""
+    if step <= 0 or step > _LARGE * float(np.ptp(values)):
+        return True
+    leading = step / 10 ** np.floor(np.log10(step * (1 + _SAME)))
+    is_round = min(abs(leading - d) for d in (1, 2, 5)) < _SAME
+    return is_round and len(np.unique(values)) <= _MANY
+
+
+_LARGE = 0.02  # of the range
+
+
+def step_of(values: Array) -> float:
+    """Step of the lattice on which all values (n,) lie; 0 where they lie on none. A few values that
+    are evenly spaced are levels, and what answered to these; of them the decimals tell."""
+    span = float(np.ptp(values))
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > _SAME * span]
+    if len(steps) < _FEWEST - 1:
+        return 0.0
+    places = steps / steps.min()
+    if np.any(np.abs(places - np.round(places)) > _MULTIPLE):
+        return 0.0
+    step = float(np.median(steps / np.round(places)))
+    return step if len(steps) > _MANY or places.max() > _EVENLY else _decimal(values, step)
+
+
+_MANY, _EVENLY = 50, 1.5  # steps that are no levels; of the least of them
+
+
+def _decimal(values: Array, most: float) -> float:
+    """The largest power of ten, no larger than `most`, of which all values are multiples."""
+    step = 10.0 ** np.floor(np.log10(most * (1 + _SAME)))
+    for _ in range(_DECIMALS):
+        places = values / step
+        if np.all(np.abs(places - np.round(places)) < _MULTIPLE):
+            return float(step)
+        step /= 10
+    return 0.0
+
+
+_DECIMALS = 4  # powers of ten that are tried

@@ -1,0 +1,87 @@
+"""Digits that are coarser than what was stated of a channel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.data import GapData
+from identification.gap.recording.digits import as_fine_as_digits, step_of
+from rig.diagnosis.diagnose_text import render
+from tests.explained import explained
+from tests.unit.test_gap_operators import bench_data
+
+SPRING = 5e-7  # m/N
+LEVELS_N = 47.0 * np.array([*range(10), *range(8, -1, -1)])
+
+
+def read(
+    laser_m: float = 0.0,
+    converter_N: float = 0.0,
+    *,
+    noise: tuple[float, float] = (0.02, 1e-7),
+    stated: tuple[float, float] = (0.02, 1e-7),
+    bends: float = 0.0,
+) -> GapData:
+    """Three runs up and down, of a spring that may bend, read in steps where these are given."""
+    rng = np.random.default_rng(3)
+    load = np.tile(np.repeat(LEVELS_N, 5), 3)
+    n = len(load)
+    moved = SPRING * load * (1 + bends * load / LEVELS_N.max())
+    force = load + rng.normal(0, noise[0], n)
+    moved = moved + rng.normal(0, noise[1], n)
+    force = converter_N * np.round(force / converter_N) if converter_N else force
+    moved = laser_m * np.round(moved / laser_m) if laser_m else moved
+    step = np.tile(np.repeat(np.r_[0:10, 8:-1:-1], 5), 3)
+    run = np.repeat(np.arange(3), n // 3)
+    data = bench_data(force, moved, step=step, compliance=np.array([SPRING]))
+    data = replace(data, run=run, repetition=run, time=np.tile(np.arange(n // 3) * 1.0, 3))
+    meter = replace(data.instruments, force=stated[0], displacement=stated[1])
+    return replace(data, instruments=meter)
+
+
+@pytest.mark.parametrize("step", [1e-3, 0.488, 2.0])
+def test_a_lattice_is_found_by_its_least_step(step: float) -> None:
+    values = step * np.random.default_rng(1).integers(-40, 400, 60)
+    assert step_of(values) == pytest.approx(step)
+    assert step_of(np.round(values / 9.80665, 6)) == pytest.approx(step / 9.80665, rel=1e-3)
+    assert step_of(values + np.random.default_rng(2).normal(0, step, 60)) == 0
+
+
+def test_few_values_that_are_evenly_spaced_tell_by_their_decimals() -> None:
+    assert step_of(0.22 * np.arange(12)) == pytest.approx(0.01)
+    assert step_of(0.2237 * np.arange(12)) == pytest.approx(1e-4)
+    assert step_of(np.pi * np.arange(12)) == 0
+    assert step_of(0.488 * np.arange(200)) == pytest.approx(0.488), "a converter at all its codes"
+
+
+def test_one_value_or_a_handful_has_no_lattice() -> None:
+    assert step_of(np.zeros(50)) == 0
+    assert step_of(np.repeat([0.0, 1.0, 2.0, 4.0], 20)) == 0
+
+
+@pytest.mark.parametrize("levels_N", [LEVELS_N, np.array([0, 1, 2, 5, 10, 20, 50, 100, 200, 500])])
+def test_levels_that_somebody_set_are_no_digits(levels_N: np.ndarray) -> None:
+    exact = bench_data(np.tile(levels_N, 3), SPRING * np.tile(levels_N, 3) + np.pi * 1e-7)
+    assert as_fine_as_digits(exact) is exact
+
+
+def test_digits_finer_than_what_is_stated_change_nothing() -> None:
+    data = read(3e-7, 0.06)
+    assert as_fine_as_digits(data) is data
+
+
+@pytest.mark.parametrize(("laser_m", "converter_N"), [(5e-6, 0.0), (0.0, 0.488), (5e-6, 0.488)])
+def test_what_digits_leave_is_no_gap(laser_m: float, converter_N: float) -> None:
+    found = explained(read(laser_m, converter_N))
+    assert found.verdict == "none"
+    text = render(found)
+    assert ("displacement is read in steps of 0.005 mm" in text) is (laser_m > 0)
+    assert ("force is read in steps of 0.488 N" in text) is (converter_N > 0)
+
+
+def test_a_curve_beyond_its_digits_is_still_seen() -> None:
+    found = explained(read(5e-6, bends=0.4))
+    assert found.verdict == "joint_nonlinear_stiffness"
