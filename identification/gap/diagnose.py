@@ -9,7 +9,7 @@ from math import inf
 from identification.arrays import Flags
 from identification.gap.answer.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.answer.forms import Form
-from identification.gap.answer.known import knowing
+from identification.gap.answer.known import in_question, is_gone, knowing
 from identification.gap.answer.posterior import settled
 from identification.gap.answer.result import ALIKE, GapResult, result_of, with_twins
 from identification.gap.data import GapData
@@ -36,7 +36,7 @@ from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
 from identification.gap.search.strange import with_strangers
-from identification.gap.search.unseen import Unseen, unseen
+from identification.gap.search.unseen import Unseen, by_one_word, unseen
 from identification.gap.words import WORDS
 
 Progress = Callable[[str, float], None]
@@ -82,6 +82,7 @@ def explain_gap(
     _check_shown(forced, variants)
     tell("comparing effects", 0.2)
     found = _with_unseen(_searched(engine, variants), known, withheld)
+    found, gone = _without_what_is_gone(found, bench, known, withheld)
     tell("withheld data", 0.7)
     found = learned(earned(found), withheld)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
@@ -89,6 +90,7 @@ def explain_gap(
     chosen = force(found.engine, found.variants, found.explanations, plain, forced)
     chosen, each = settled(found.engine, found.variants, chosen, found.explanations)
     result = with_twins(result_of(found, verdict, chosen, each, fuller), chosen, withheld)
+    result = replace(result, gone=gone)
     if not forced <= plain.words:
         result = replace(result, without_added=left_of(found.engine, fit(found.engine, plain)))
 
@@ -125,12 +127,28 @@ def _searched(engine: Engine, variants: Sequence[Variant]) -> SearchResult:
     return looked_up(with_strangers(with_plain_trouble(found)))
 
 
+def _without_what_is_gone(
+    found: SearchResult, bench: Bench, known: Sequence[Form], withheld: Collection[str]
+) -> tuple[SearchResult, tuple[str, ...]]:
+    """The search without those effects of the simulation that are not in the data as it has them,
+    and their words: a mechanism was repaired since, or goes on at another load."""
+    gone: list[str] = []
+    while (word := in_question(found)) is not None:
+        kept = [f for f in known if f.word not in (word, *gone)]
+        again = _with_unseen(_searched(*_prepared(bench, kept, withheld)), kept, withheld)
+        if not is_gone(found, again):
+            break
+        found, gone = again, [*gone, word]
+    return found, tuple(gone)
+
+
 def _with_unseen(
     found: SearchResult, known: Sequence[Form], withheld: Collection[str]
 ) -> SearchResult:
     """The search once more with loads between readings, where these explain more than it costs to
     say which they are, or make foretold what was not."""
-    paid, paid_off = 0.0, True
+    found, paid = _by_one_word(found, known, withheld)
+    paid_off = True
     for i in range(_ROUNDS):
         foretold = foretells(found)
         if _hopeless(found, foretold, paid_off):
@@ -150,6 +168,28 @@ def _with_unseen(
         if foretold:
             break
     return found
+
+
+def _by_one_word(
+    found: SearchResult, known: Sequence[Form], withheld: Collection[str]
+) -> tuple[SearchResult, float]:
+    """The search once more with the loads that one word alone asks for, and nats that it takes to
+    say which, where that word then explains more than the best explanation does without."""
+    if _hopeless(found, foretells(found), paid_off=True):
+        return found, 0.0
+    best, loads = found.explanations[0].log_weight, None
+    for more in by_one_word(found):
+        others = {w for w in WORDS if w not in more.words}
+        asking = _along(found, more, known, {*withheld, *others})
+        ahead = asking.explanations[0].log_weight - more.cost
+        if ahead > best and not acts_by_hands_alone(asking):
+            best, loads = ahead, more
+    if loads is None:
+        return found, 0.0
+    again = _along(found, loads, known, withheld)
+    if not _explains_more(again, loads.cost, found, foretold=True):
+        return found, 0.0
+    return again, loads.cost
 
 
 def _better_along(

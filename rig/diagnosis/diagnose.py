@@ -36,7 +36,7 @@ _JOINT = re.compile(r"\bjoint(s?(?: but)?)(?: (\d+))?(?: and (\d+))?")
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The result with what it came from; `to_json` is schema rig.diagnosis/1. known_effects: of
-    the model that was given, part of the simulation; left_behind: words of that model which belong
+    the model that was given, part of the simulation, but for what is gone since; left_behind: words of that model which belong
     to the session that it was made from, and are no part of it; model: the model itself."""
 
     dataset: str
@@ -83,6 +83,7 @@ class Diagnosis:
             "notes": list(r.notes),
             "note_kinds": [n.kind for n in r.said],
             "known_effects": [e["name"] for e in self.known_effects],
+            "known_effects_gone": list(r.gone),
             "banners": list(self.banners),
         }
 
@@ -92,6 +93,12 @@ class Diagnosis:
 
         names = ", ".join(dict.fromkeys(str(e["name"]) for e in self.known_effects))
         known = [f"The simulation has these effects already: {names}."] if names else []
+        if gone := " and ".join(self.result.gone):
+            known.append(
+                f"The model's {gone} does not do to these data what it did to those that it was "
+                "made from: repaired since, gone on, or under a force that was read otherwise. "
+                "What follows is about the simulation without it."
+            )
         if self.left_behind:
             known.append(
                 f"Left out of the model: {', '.join(self.left_behind)}, of the session that it was "
@@ -148,7 +155,8 @@ def diagnose(
         raise InputError(f"--add: {error}.") from error
     except NotKnown as error:
         raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
-    return Diagnosis(dataset.uuid, result, dataset.banners(), given.effects, given.behind, read)
+    there = tuple(e for e in given.effects if e["name"] not in result.gone)
+    return Diagnosis(dataset.uuid, result, dataset.banners(), there, given.behind, read)
 
 
 def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:

@@ -51,10 +51,16 @@ def test_a_lattice_is_found_by_its_least_step(step: float) -> None:
 
 
 def test_few_values_that_are_evenly_spaced_tell_by_their_decimals() -> None:
-    assert step_of(0.22 * np.arange(12)) == pytest.approx(0.01)
-    assert step_of(0.2237 * np.arange(12)) == pytest.approx(1e-4)
-    assert step_of(np.pi * np.arange(12)) == 0
-    assert step_of(0.488 * np.arange(200)) == pytest.approx(0.488), "a converter at all its codes"
+    each = np.repeat(np.arange(12), 5)
+    assert step_of(0.22 * each) == pytest.approx(0.01)
+    assert step_of(0.2237 * each) == pytest.approx(1e-4)
+    assert step_of(np.pi * each) == 0
+    assert step_of(0.488 * np.repeat(np.arange(200), 3)) == pytest.approx(0.488), "at every code"
+
+
+def test_what_is_read_once_at_every_place_is_a_ramp() -> None:
+    assert step_of(0.22 * np.arange(12)) == 0
+    assert step_of(np.linspace(0.0, 1.0, 80)) == 0
 
 
 def test_one_value_or_a_handful_has_no_lattice() -> None:

@@ -263,10 +263,10 @@ def test_none_is_looked_at_between_the_levels_as_well() -> None:
     target = bench.observed - prediction(bench)
     target[: bench.rows.n] += 4e-7 * rng.normal(size=bench.rows.level.max() + 1)[bench.rows.level]
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
-    sizes = 3e-6 * np.exp(-LOG_STEP * np.array([1.0, 2 / 3, 1 / 3, 0.0]))
+    sizes = 3e-6 * np.exp(-LOG_STEP * np.arange(6, -1, -1) / 3)
     between = [log_joint_between(engine, (), float(eta)) for eta in sizes]
     less = 0.2  # a bench whose noise is known to a factor
-    wanted = log_mean([engine.levels[0].log_base, *between], [1 - less, *[less / 4] * 4])
+    wanted = log_mean([engine.levels[0].log_base, *between], [1 - less, *[less / 7] * 7])
     assert _as_stated(engine) == pytest.approx(wanted, abs=1e-6)
     assert max(between[:3]) > between[3] + 1.0  # which the levels alone would not see
 

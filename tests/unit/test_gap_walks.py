@@ -61,7 +61,7 @@ def of_jumps(size_mm: float, design: str = "medium") -> Bench:
 
 def walking(bench: Bench) -> list[Variant]:
     found = [*joint_yield.variants(bench), *base_slip.variants(bench)]
-    return [v for v in found if v.info["memory"] == WALKS]
+    return [v for v in found if v.info["knee"] == WALKS]
 
 
 @pytest.mark.parametrize(

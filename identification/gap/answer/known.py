@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.gap.answer.forms import Form, lawful, realise
-from identification.gap.explanations.explanation import LAW_REMAINDER
+from identification.gap.explanations.explanation import LAW_REMAINDER, SearchResult
+from identification.gap.explanations.fit import fit
 from identification.gap.laws.law import ACROSS, KEPT
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, KnownEffects
@@ -66,6 +68,36 @@ def _misfit(bench: Bench) -> float:
     return float((target @ target - inner @ (white.T @ target)) / 2)
 
 
+def in_question(found: SearchResult) -> str | None:
+    """The word of an effect of the simulation that may not be in the data as it has it: one whose
+    size or loads the best explanation has far off, or beside which that needs the same word once
+    more. None where all are about as the model has them."""
+    engine, best = found.engine, found.explanations[0]
+    if engine.bench.known is None:
+        return None
+    base = fit(engine, best).base / engine.base.sd
+    off: dict[str, float] = {}
+    for name, z in zip(engine.base.names, base, strict=True):
+        if name.startswith(_SAID):
+            word = name.split()[-1]
+            twice = inf if word in best.words else 0.0
+            off[word] = max(off.get(word, 0.0), abs(float(z)), twice)
+    worst = max(off, key=lambda word: off[word])
+    return worst if off[worst] > _OFF else None
+
+
+def is_gone(found: SearchResult, without: SearchResult) -> bool:
+    """Whether the same is explained as well, or far better, by a simulation without an effect that
+    is in question: then it is not there as the model has it."""
+    best, again = found.explanations[0], without.explanations[0]
+    as_well = again.eta <= max(best.eta, without.engine.bench.noise.stated)
+    return as_well or again.log_weight > best.log_weight + _GONE
+
+
+_SAID = "known "  # so begin the names of what is not known of the simulation's effects
+_OFF, _GONE = 2.5, 20.0  # standard deviations; nats
+
+
 def _with_known(bench: Bench, forms: Sequence[Form]) -> Bench:
     """The bench with these effects known, whatever they remember."""
     less, does, more = (
@@ -75,7 +107,7 @@ def _with_known(bench: Bench, forms: Sequence[Form]) -> Bench:
     later, whole = (more - less) / 2, np.linalg.norm(does, axis=0)
     later *= np.minimum(whole / np.maximum(np.linalg.norm(later, axis=0), _TINY), 1.0)
     free = np.hstack([SIZE_SD * does, later])
-    names = tuple(f"known {what} {f.word}" for what in ("size", "load") for f in forms)
+    names = tuple(f"{_SAID}{what} {f.word}" for what in ("size", "load") for f in forms)
     rows, noise, total = bench.rows, bench.noise, does.sum(axis=1)
     left = LAW_REMAINDER * rows.rms_about_means(total[: rows.n])
     return replace(

@@ -67,7 +67,8 @@ class GapResult:
     remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
     on average stands in `after`. looks_like: of an unknown gap, where that is plain. without_added:
     `after` without the words that were to be added; None where there were none, or the
-    explanation had them. said: what is to be known beside, by kind.
+    explanation had them. said: what is to be known beside, by kind. gone: words of the simulation's
+    effects that are not in the data as it has them; all that is said is of the simulation without.
     """
 
     verdict: str
@@ -88,6 +89,7 @@ class GapResult:
     fit: Fit
     found: SearchResult
     without_added: float | None = None
+    gone: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

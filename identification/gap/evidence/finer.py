@@ -16,6 +16,7 @@ from identification.gap.evidence.imperfection import LOG_STEP, level_priors, log
 from identification.gap.evidence.parts import Part, log_joint_between, log_joints
 
 PARTS = 3  # of a step between levels
+BELOW = 2  # steps below the least level, from which on it is looked at
 _POINTS = 25  # of the integral, per part of a step
 
 
@@ -27,7 +28,7 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     coarse = joint + level_priors(etas, energy)
     best = int(coarse.argmax())
     last = min(max(best, 1) + 1, len(etas) - 1)
-    lowest = np.log(etas[1]) - 2 * LOG_STEP if best <= 1 else np.log(etas[best - 1])
+    lowest = np.log(etas[1]) - BELOW * LOG_STEP if best <= 1 else np.log(etas[best - 1])
     # a parabola takes three points, however near the levels lie
     parts_between = max(2, round((np.log(etas[last]) - lowest) / LOG_STEP * PARTS))
     x = np.linspace(lowest, np.log(etas[last]), parts_between + 1)

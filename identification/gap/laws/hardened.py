@@ -11,12 +11,14 @@ from identification.arrays import Array, Flags
 from identification.gap.laws.lasting import HARDENS, lasting
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import whiles
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import SET_UP_ANEW, Variant
 from identification.gap.recording.turns import way_back
 
-HARDENED = " hardened"
+HARDENED = "hardened"  # its knee
 UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
 _LEFT = 0.2  # of the largest response: as much as friction seldom holds
+_FINE = np.linspace(-0.16, 0.2, 13)  # radii of a closer look, from that of the knee on
+_PRIOR, _FINE_PRIOR = 0.7, 0.25
 
 
 def hardened(
@@ -43,23 +45,66 @@ def hardened(
         or bench.course.left_behind > _LEFT
     ):
         radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
-    columns = [column(s) for s in grown(load, radius, bench.moved).T]
-    return [
-        lasting(
-            word,
-            f"{name}{HARDENED} beyond {radius[k] / top:.3g}",
-            columns[k:],
-            np.diag([1.0, *[HARDENS] * (len(radius) - k - 1)]),
-            0.7 / len(radius),
-            info,
-            memory=HARDENED,
-            radius=radius[k:],
-            load=load,
-            column=column,
-            knee="hardened",
-        )
-        for k in range(len(radius))
+    out = []
+    for memory, fresh in _memories(bench).items():
+        columns = [column(s) for s in grown(load, radius, fresh).T]
+        facts = {**info, "memory": memory, "load": load, "column": column}
+        for k, r in enumerate(radius):
+            label = f"{name}{memory} {HARDENED} beyond {r / top:.3g}"
+            share = _PRIOR / len(radius)
+            out.append(_shape(word, label, columns[k:], radius[k:], share, facts))
+    return out
+
+
+def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[Variant]:
+    """Thresholds about that of a knee that was found with coefficients w (k,): of the sharp one of
+    the same end and work. It lies between two neighbours, and hardens on or softens, or not. close:
+    share of the steps."""
+    info, load, radius = found.info, np.asarray(found.info["load"]), np.asarray(found.info["radius"])
+    top, w = float(np.abs(load).max()), np.maximum(w, 0.0)
+    beyond = np.maximum(top - radius, 0.0)
+    path = float(w @ beyond)
+    knee = top - float(w @ beyond**2) / path if path > 0 else 0.0
+    if not knee > 0:
+        return []
+    radius = knee * (1 + close * _FINE)
+    columns = [
+        info["column"](s) for s in grown(load, radius, _memories(bench)[info["memory"]]).T
     ]
+    place = {key: info[key] for key in info if key not in _OWN}
+    out, share = [], _FINE_PRIOR / len(radius) / 2
+    for k, r in enumerate(radius[:-1]):
+        for last in dict.fromkeys((k + 2, len(radius))):
+            label = f"{found.label.partition(HARDENED)[0]}{HARDENED} beyond {r:.4g} fine"
+            out.append(_shape(found.word, label, columns[k:last], radius[k:last], share, place))
+    return out
+
+
+_NEIGHBOURS = 2
+_OWN = ("radius", "centre", "flow_s", "back", "knee")  # facts of a shape rather than of its place
+
+
+def _memories(bench: Bench) -> dict[str, Flags]:
+    """When it is as new: in another pose, or when the rig was turned to another direction, too."""
+    out = {"": bench.moved}
+    if np.sum(bench.rebuilt) > np.sum(bench.moved):
+        out[SET_UP_ANEW] = bench.rebuilt
+    return out
+
+
+def _shape(
+    word: str,
+    label: str,
+    columns: list[int],
+    radius: Array,
+    prior: float,
+    info: dict[str, Any],
+) -> Variant:
+    """Columns and radii (k,) of the knee and of what hardens, or softens, on."""
+    root = np.diag([1.0, *[HARDENS] * (len(radius) - 1)])
+    if len(radius) == _NEIGHBOURS:
+        root = np.eye(_NEIGHBOURS)
+    return lasting(word, label, columns, root, prior, radius=radius, knee=HARDENED, info=info)
 
 
 def grown(load: Array, radius: Array, fresh: Flags) -> Array:

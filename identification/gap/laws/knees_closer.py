@@ -5,20 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from identification.gap.laws import flows
+from identification.gap.laws import flows, hardened
 from identification.gap.laws.closer import (
     Word,
     closing_in,
+    estimate,
     evidence,
     places,
     scored_beside,
     shows,
 )
 from identification.gap.laws.flows import Flow
+from identification.gap.laws.hardened import HARDENED
 from identification.gap.laws.knees import FLOWS_BACK, fresh_of, is_sharp, with_back
 from identification.gap.laws.lasting import SCALES
 from identification.gap.laws.specimens import OWN, plateaus, with_other_springs
@@ -50,7 +53,13 @@ def finer(word: Word, between: Between | None = None) -> list[Variant]:
     best = places(word.alone, word.beside, is_sharp)
     closer = closing_in(word, refined, best, CLOSE)
     flat = [v for s in best for v in plateaus(word.engine.bench, s.variant)]
-    return closer + flat + _elsewhere(word, closer, between)
+    firm = places(word.alone, word.beside, lambda v: bool(v.info["knee"] == HARDENED))
+    lasts = closing_in(word, partial(_hardened, word), firm, CLOSE)
+    return closer + flat + lasts + _elsewhere(word, closer, between)
+
+
+def _hardened(word: Word, bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
+    return hardened.refined(bench, found, estimate(word.engine, found).coefficients, close)
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:

@@ -36,8 +36,6 @@ _MEMORY = {
     "": KEPT,
     LASTING: ACROSS,
     TAKEN_BACK: LOST,
-    HARDENED: KEPT,
-    WALKS: KEPT,
     UNDER_WEIGHT: HUNG,
     BACK_UNDER_WEIGHT: HUNG_LOST,
     SET_UP_ANEW: ANEW,
@@ -53,11 +51,11 @@ def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Ar
     if info.get("square"):
         constants["flow_exponent"] = _SQUARE
     radius = [float(r) for r in info["radius"]]
-    if info["memory"] == WALKS:
+    if info["knee"] == WALKS:
         pairs = zip(radius, map(float, info["fading"]), strict=True)
         terms = [Term("compliance", {"walks_beyond": r, "fading": p}) for r, p in pairs]
     else:
-        begins = "grows_beyond" if info["memory"] == HARDENED else "threshold"
+        begins = "grows_beyond" if info["knee"] == HARDENED else "threshold"
         terms = [Term("compliance", {begins: r}) for r in radius]
     own = bool(info.get("other_springs"))
     if len(v.columns) > len(radius) + own:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from identification.arrays import Array
@@ -22,26 +21,14 @@ def lasting(
     prior: float,
     info: dict[str, Any],
     *,
-    memory: str,
     radius: Array,
-    load: Array,
-    column: Callable[[Array], int],
     knee: str,
     each: bool = False,
 ) -> Variant:
     """One such shape: its columns of the pool begin at radii of a load (n,), the first one's is
-    that of the knee. info: what else its law is written from."""
-    exact = {
-        **info,
-        "memory": memory,
-        "flow_s": 0.0,
-        "radius": radius,
-        "centre": radius[0],
-        "load": load,
-        "column": column,
-        "back": {},
-        "knee": knee,
-    }
+    that of the knee. info: memory, load, the column of a state, and what else its law is written
+    from."""
+    exact = {**info, "flow_s": 0.0, "radius": radius, "centre": radius[0], "back": {}, "knee": knee}
     return variant(
         word, label, columns, SCALES, root=root, prior=prior, least=LEAST, each=each, **exact
     )

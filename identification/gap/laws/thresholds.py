@@ -111,7 +111,7 @@ def _onsets(bench: Bench, load: Array, threshold: Parameter) -> dict[str, Parame
     out = dict[str, Parameter]()
     for number, setup in enumerate(bench.data.setups):
         mine, name = bench.rows.setup == number, f"onset_{setup.direction}"
-        push = bench.load[mine]
+        push = bench.true_load[mine]
         power = float(push @ push)
         lever = abs(float(push @ load[mine])) / power if power > 0 else 0.0
         if not lever * float(np.abs(push).max(initial=0.0)) > threshold.value > 0:

@@ -21,7 +21,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.history import whiles
 from identification.gap.model.variants import Variant
 
-WALKS = " that walks"
+WALKS = "walks"  # its knee
 BEYOND = (0.18, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the range
 FADING = (0.0, 0.5, 1.0, 2.0)
 _LET_GO = 0.5  # of the threshold: a load below it ends a pass
@@ -48,22 +48,20 @@ def walking(
     if not states.any():
         return []
     columns, out = np.reshape([column(s) for s in states.T], r.shape), list[Variant]()
+    facts = {**info, "memory": "", "load": load, "column": column}
     places = list(product(range(len(radius) - 1), range(len(FADING) - 1)))
     for k, fades in places:
         here = np.ix_((k, k + 1), (fades, fades + 1))
         out.append(
             lasting(
                 word,
-                f"{name}{WALKS} beyond {radius[k]:.3g}, fading {FADING[fades]:g}",
+                f"{name} that {WALKS} beyond {radius[k]:.3g}, fading {FADING[fades]:g}",
                 columns[here].ravel().tolist(),
                 np.eye(4),
                 _LIKELY / len(places),
-                {**info, "fading": p[here].ravel()},
-                memory=WALKS,
+                {**facts, "fading": p[here].ravel()},
                 radius=r[here].ravel(),
-                load=load,
-                column=column,
-                knee="walks",
+                knee=WALKS,
                 each=True,
             )
         )

@@ -148,11 +148,13 @@ class Bench:
 
     @cached_property
     def zero_line(self) -> Array:
-        """(n,) N: what the force shows at zero load before and after a run, straight in between; 0
-        where it stands still within its noise, or was not read at both ends. A threshold is met
-        by the force less this; springs alone would not mind."""
-        none = np.zeros(self.rows.n)
-        return none if self.imposed else force_without_load(self.rows, self.noise.force)
+        """(n,) N: what the force shows at zero load, straight in between; 0 where it stands still
+        within its noise, or was read but once. A threshold is met by the force less this; springs
+        alone would not mind."""
+        if self.imposed:
+            return np.zeros(self.rows.n)
+        tared = self.data.tare == "run"
+        return force_without_load(self.rows, self.noise.force, tared=tared)
 
     @cached_property
     def true_load(self) -> Array:
@@ -229,7 +231,7 @@ class Bench:
         out[: layout.n] = noise.response
         total = np.sqrt(rows.hold_weight[rows.edges])
         if layout.q.stop > layout.q.start:
-            out[layout.q] = np.concatenate([s / total for s in noise.q])
+            out[layout.q] = np.maximum(noise.q[:, None] / total, noise.q_hold).ravel()
         if rows.tangential is not None:
             out[layout.tangential] = np.tile(noise.force / total, 2)
         if self.has_zero_force:

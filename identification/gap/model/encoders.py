@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, Ints
 from identification.gap.data import GapData
+from identification.gap.recording.digits import in_one_number, step_of
 from identification.gap.recording.holds import ENOUGH, scatter_within
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.white import QUARTILE
@@ -17,20 +18,37 @@ ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q again
 
 
 class Readings(NamedTuple):
-    """Standard deviations, rad: of one reading (m,); of what all readings of a run are off by, and
-    all of a setup, each joint by its own."""
+    """Standard deviations, rad: of one reading (m,); of what digits leave of every hold's (m, h); of
+    what all readings of a run are off by, and all of a setup, each joint by its own."""
 
     one: Array
+    hold: Array
     run: float
     setup: float
 
 
 def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
     """From what the joints read while the arm rests in holds (n,), and at zero load."""
-    one = _one(data, rows, hold)
+    one, rounded = _one(data, rows, hold), np.zeros((data.joints, len(rows.edges)))
     if data.q is None or rows.continuous:
-        return Readings(one, 0.0, 0.0)
-    return Readings(one, *_between_runs(data, rows, one))
+        return Readings(one, rounded, 0.0, 0.0)
+    first = np.unique(data.setup, return_index=True)[1]
+    turned = data.q - data.q[first][np.unique(data.setup, return_inverse=True)[1]]
+    common = step_of(turned.ravel())  # a joint that hardly turns shows too few of them
+    for j, step in enumerate(common or step_of(q) for q in turned.T):
+        one[j] = max(one[j], step / 12**0.5)
+        if step > 0 and in_one_number(data.q[:, j], hold):
+            rounded[j] = _rounded(rows, j, step)
+    return Readings(one, rounded, *_between_runs(data, rows, one))
+
+
+def _rounded(rows: Rows, joint: int, step: float) -> Array:
+    """(h,) rad that digits leave of the readings of a joint in every hold. Holds of a setup that
+    read the same are off by about the same, and together tell no more than one."""
+    assert rows.q is not None
+    code = np.round(rows.hold_means(rows.q[:, joint]) / step)
+    same = np.unique(np.stack([rows.setup[rows.edges], code]), axis=1, return_inverse=True)[1]
+    return np.asarray(step / 12**0.5 * np.sqrt(np.bincount(same.ravel())[same.ravel()]))
 
 
 def _one(data: GapData, rows: Rows, hold: Ints) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, Ints
 from identification.gap.recording.rows import Rows
 
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
@@ -35,24 +35,42 @@ def means_move(rows: Rows, load: Array, left: Array, least: float) -> bool:
     return False
 
 
-def force_without_load(rows: Rows, noise: float) -> Array:
-    """(n,) N: what the force shows at zero load before and after a run, straight in between; 0
-    where it stands still within its noise N, or was not read at both ends."""
+def force_without_load(rows: Rows, noise: float, *, tared: bool) -> Array:
+    """(n,) N: what the force shows at zero load, straight from plateau to plateau of a setup, and
+    on beyond the last one as from the first to there; their mean where it stands still within its
+    noise N, 0 where that is no more than noise, or was read once. tared: before every run, each of
+    which then tells of itself alone."""
     out = np.zeros(rows.n)
-    for run in np.unique(rows.run):
-        mine = np.flatnonzero(rows.run == run)
-        pushed = mine[~rows.zero[mine]]
-        if not pushed.size:
+    each = rows.run if tared else rows.setup
+    for part in np.unique(each):
+        mine = np.flatnonzero(each == part)
+        plateaus = _plateaus(rows, mine)
+        if len(plateaus) < _TWO or rows.zero[mine].all():
             continue
-        zero = mine[rows.zero[mine]]
-        ends = zero[zero < pushed[0]], zero[zero > pushed[-1]]
-        if not all(e.size for e in ends):
+        time, force, weight = (np.array(v) for v in zip(*plateaus, strict=True))
+        sd = noise * float(np.sqrt(1 / weight[force.argmin()] + 1 / weight[force.argmax()]))
+        if np.ptp(force) <= _DRIFTS * sd:
+            mean, total = float(np.average(force, weights=weight)), float(weight.sum())
+            out[mine] = mean if abs(mean) > _DRIFTS * noise / total**0.5 else 0.0
             continue
-        weight = [rows.weight[e] for e in ends]
-        both = list(zip(ends, weight, strict=True))
-        force = [np.average(rows.measured_force[e], weights=w) for e, w in both]
-        time = [np.average(rows.session[e], weights=w) for e, w in both]
-        sd = noise * float(np.sqrt(sum(1 / w.sum() for w in weight)))
-        if abs(force[1] - force[0]) > _DRIFTS * sd:
-            out[mine] = np.interp(rows.session[mine], time, force)
+        if (end := float(rows.session[mine].max())) > time[-1] > time[0]:
+            rate = (force[-1] - force[0]) / (time[-1] - time[0])
+            time, force = np.append(time, end), np.append(force, force[-1] + rate * (end - time[-1]))
+        out[mine] = np.interp(rows.session[mine], time, force)
+    return out
+
+
+_TWO = 2
+
+
+def _plateaus(rows: Rows, mine: Ints) -> list[tuple[float, float, float]]:
+    """Time s, force N and weight of every plateau without load in rows that follow each other."""
+    zero = mine[rows.zero[mine]]
+    apart = np.flatnonzero((np.diff(zero) > 1) | np.diff(rows.run[zero]).astype(bool)) + 1
+    out = []
+    for rest in np.split(zero, apart):
+        if rest.size and rows.weight[rest].sum() > 0:
+            w = rows.weight[rest]
+            at = (np.average(v[rest], weights=w) for v in (rows.session, rows.measured_force))
+            out.append((*map(float, at), float(w.sum())))
     return out

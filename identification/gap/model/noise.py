@@ -10,8 +10,8 @@ from identification.arrays import Array, Ints
 from identification.gap.data import GapData
 from identification.gap.model.driven import steepness
 from identification.gap.model.encoders import readings_of
+from identification.gap.recording.digits import digit_of, in_one_number
 from identification.gap.recording.holds import (
-    ENOUGH,
     hold_ids,
     rest_ids,
     scatter_of_three,
@@ -44,10 +44,12 @@ class Noise:
     swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
     which share of what is stated it may differ from hold to hold. seen: of one
     sample, m, as far as a rig without an arm showed it: 0 where it read every level but once.
-    q_run, q_setup: common to the readings of a joint in a run, in a setup, rad."""
+    q_hold (m, holds): what digits leave of a hold's; q_run, q_setup: common to the readings of a
+    joint in a run, in a setup, rad."""
 
     response: Array
     q: Array
+    q_hold: Array
     force: float
     hold: Array
     run: float
@@ -73,9 +75,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     fallback = np.hypot(meter.displacement, slope * meter.force)
     hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
-    of_force = np.maximum(
-        meter.force / np.sqrt(rows.hold_weight), _rounded(data.force, meter.force, hold)
-    )
+    of_force = meter.force / np.sqrt(rows.hold_weight)
+    if digit_of(data, "force") > 0:
+        of_force = np.maximum(of_force, _rounded(data.force, meter.force, hold))
     common = np.where(rows.steady, steep * of_force, 0.0)
     whites = _whites(data) if rows.continuous else (0.0, 0.0)
     if rows.continuous:
@@ -112,6 +114,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     return Noise(
         response=per_sample / np.sqrt(weight),
         q=readings.one,
+        q_hold=readings.hold,
         q_run=readings.run,
         q_setup=readings.setup,
         force=meter.force,
@@ -153,15 +156,11 @@ _TOGETHER = 0.02
 _LITTLE = 2.0  # times what is stated: what scatters more was misjudged
 
 
-_ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
-
-
 def _rounded(values: Array, stated: float, hold: Ints) -> float:
     """What all readings (n,) of a hold are off by together because the sensor rounds them, and they
     scatter by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
     stated of one; 0 where they scatter."""
-    again = np.diff(hold) == 0
-    if again.sum() < ENOUGH or np.mean(np.diff(values)[again] == 0) < _ONE_NUMBER:
+    if not in_one_number(values, hold):
         return 0.0
     steps = np.diff(np.unique(values))
     real = steps[steps > _SAME * float(np.ptp(values))]

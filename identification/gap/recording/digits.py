@@ -11,9 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, Ints
 from identification.gap.data import GapData
+from identification.gap.recording.holds import ENOUGH
 
+_ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
 _FEWEST = 6  # values that tell a lattice
 _MULTIPLE = 0.05  # of a step by which a value may be off the lattice: conversions round, too
 _SAME = 1e-9  # of the range: digits that a conversion of units leaves
@@ -24,11 +26,7 @@ def as_fine_as_digits(data: GapData) -> GapData:
     where these are fine enough."""
     meter, notes = data.instruments, list[str]()
     for channel, unit, per_unit in (("force", "N", 1.0), ("displacement", "mm", 1e-3)):
-        values, stated = getattr(data, channel), getattr(meter, channel)
-        step = step_of(values)
-        drives = channel == ("displacement" if data.imposed == "displacement" else "force")
-        if drives and _may_be_set(values, step):
-            continue
+        stated, step = getattr(meter, channel), digit_of(data, channel)
         if (least := step / 12**0.5) > stated:
             meter = replace(meter, **{channel: least})
             notes.append(
@@ -37,6 +35,22 @@ def as_fine_as_digits(data: GapData) -> GapData:
                 f"{unit} is stated. It was taken as uncertain as its digits leave it."
             )
     return replace(data, instruments=meter, notes=(*data.notes, *notes)) if notes else data
+
+
+def in_one_number(values: Array, hold: Ints) -> bool:
+    """Whether values (n,) mostly stay at one number in holds (n,), as they scatter by less than a
+    step: taking more of them tells no more."""
+    again = np.diff(hold) == 0
+    return bool(again.sum() >= ENOUGH and np.mean(np.diff(values)[again] == 0) >= _ONE_NUMBER)
+
+
+def digit_of(data: GapData, channel: str) -> float:
+    """Step (N, m) in which a channel is read; 0 where none shows, or where it may be what was set
+    rather than read."""
+    values = getattr(data, channel)
+    step = step_of(values)
+    drives = channel == ("displacement" if data.imposed == "displacement" else "force")
+    return 0.0 if drives and _may_be_set(values, step) else step
 
 
 def _may_be_set(values: Array, step: float) -> bool:
@@ -53,8 +67,9 @@ _LARGE = 0.02  # of the range
 
 
 def step_of(values: Array) -> float:
-    """Step of the lattice on which all values (n,) lie; 0 where they lie on none. A few values that
-    are evenly spaced are levels, and what answered to these; of them the decimals tell."""
+    """Step of the lattice on which all values (n,) lie; 0 where they lie on none. Where it is at
+    every place of that, a converter reads one again and again, and a ramp does not; a few places
+    are levels, and what answered to these: of them the decimals tell."""
     span = float(np.ptp(values))
     steps = np.diff(np.unique(values))
     steps = steps[steps > _SAME * span]
@@ -64,10 +79,15 @@ def step_of(values: Array) -> float:
     if np.any(np.abs(places - np.round(places)) > _MULTIPLE):
         return 0.0
     step = float(np.median(steps / np.round(places)))
-    return step if len(steps) > _MANY or places.max() > _EVENLY else _decimal(values, step)
+    if places.max() > _EVENLY:
+        return step
+    if np.mean(np.diff(values) == 0) < _AGAIN:
+        return 0.0
+    return step if len(steps) > _MANY else _decimal(values, step)
 
 
 _MANY, _EVENLY = 50, 1.5  # steps that are no levels; of the least of them
+_AGAIN = 0.1  # of the readings
 
 
 def _decimal(values: Array, most: float) -> float:

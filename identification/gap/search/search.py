@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.gap.evidence.compare import Scored, by_word, closest, log_mean, marginal, score
 from identification.gap.evidence.engine import Engine
-from identification.gap.evidence.finer import PARTS, gained
+from identification.gap.evidence.finer import BELOW, PARTS, gained
 from identification.gap.evidence.imperfection import LOG_STEP
 from identification.gap.evidence.parts import Part, log_joint_between, part_sizes
 from identification.gap.explanations.explanation import (
@@ -97,7 +97,7 @@ def _as_stated(engine: Engine) -> float:
     it is looked at beside an effect."""
     least, hidden = float(engine.etas[1]), _hidden(engine)
     above = np.floor(PARTS * np.log(max(hidden / least, 1.0)) / LOG_STEP)
-    etas = least * np.exp(np.arange(-PARTS, above + 1) / PARTS * LOG_STEP)
+    etas = least * np.exp(np.arange(-BELOW * PARTS, above + 1) / PARTS * LOG_STEP)
     more = [log_joint_between(engine, (), float(eta)) for eta in etas]
     less = float(
         np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0], [_SURE_SHARE, _UNSURE_SHARE])

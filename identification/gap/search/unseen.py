@@ -70,11 +70,8 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     rows (n,) that alone tell what a law does, where it does not foretell the others: then it is
     what the one says that is ahead with its loads, and none has to gain more."""
     engine = found.engine
-    rows = engine.bench.rows
-    if rows.continuous or engine.bench.imposed:
-        return None
-    at = brought_to(rows)
-    if len(at) < _FEWEST or len(at) * rows.n > _MOST:
+    rows, at = engine.bench.rows, _looked_for(engine)
+    if not at.size:
         return None
     first = found.explanations[0].log_weight
     able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
@@ -89,6 +86,36 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     if told_by is None:
         return next((more for ahead, more in worth if ahead > _PLAIN), None)
     return _of_the_one_ahead(worth, rows.overshoot)
+
+
+def by_one_word(found: SearchResult) -> Iterator[Unseen]:
+    """What words alone say of the loads between readings, the likeliest first, where each leaves
+    less along them, and no more than the best explanation does: several laws together, none of
+    which is right, may miss less along the straight path than the one that is."""
+    engine, first = found.engine, found.explanations[0]
+    at = _looked_for(engine)
+    single = (e for e in found.explanations if len(e.parts) == 1)
+    near = (e for e in single if e.log_weight > first.log_weight - _BEHIND)
+    for e in islice(near, _SEVERAL) if at.size else ():
+        path = Paths(engine, e, at, None)
+        more, gain = path.found() if path.memory else (None, 0.0)
+        if not more or not _worth(more, gain, _PAYS):
+            continue
+        missed = path.misses(more.overshoot)
+        if missed < e.eta and missed <= first.eta:
+            yield more
+
+
+_BEHIND = 1000.0  # nats that a word alone may gain by loads that no row shows
+
+
+def _looked_for(engine: Engine) -> Ints:
+    """First rows of the holds that loads may have gone beyond; none where nobody could tell."""
+    rows = engine.bench.rows
+    if rows.continuous or engine.bench.imposed:
+        return np.zeros(0, dtype=int)
+    at = brought_to(rows)
+    return at[: len(at) * (len(at) >= _FEWEST and len(at) * rows.n <= _MOST)]
 
 
 def _unlike(each: Iterable[tuple[Explanation, Paths]]) -> Iterator[tuple[Explanation, Paths]]:
@@ -222,8 +249,15 @@ class Paths:
 
     def _log_evidence(self, overshoot: Array) -> float:
         """At what the law likeliest misses along a path: no more than along the straight one."""
+        return max(self._each(overshoot))
+
+    def misses(self, overshoot: Array) -> float:
+        """That, m."""
+        return float(self._engine.etas[int(np.argmax(self._each(overshoot)))])
+
+    def _each(self, overshoot: Array) -> list[float]:
         effect = self._effect(overshoot)
-        return max(self._fit(effect, white).log_evidence for white in self._likely)
+        return [self._fit(effect, white).log_evidence for white in self._likely]
 
     def _fit(self, effect: Array, whitened: _White, told_by: Flags | None = None) -> _Fitted:
         """told_by: of the white values, those that tell the coefficients; left out: all do."""
