@@ -39,6 +39,7 @@ class Rounds:
         self._results, self._last, self._whole = iter(found), None, whole
         monkeypatch.setattr(diagnose, "foretells", lambda one: one.foretells)
         monkeypatch.setattr(diagnose, "first_repetitions", lambda engine: FIRST)
+        monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(()))
         monkeypatch.setattr(diagnose, "unseen", lambda one, told_by: self._ask(told_by))
         monkeypatch.setattr(diagnose, "_along", lambda *args: self._search(set(args[-1])))
 
@@ -142,4 +143,45 @@ def test_what_acts_only_where_a_hand_went_is_no_law(monkeypatch: pytest.MonkeyPa
     assert diagnose._with_unseen(start := result(0.0, True), (), ()) is better
     Rounds(monkeypatch, better)
     monkeypatch.setattr(diagnose, "acts_by_hands_alone", lambda one: one is better)
+    assert diagnose._with_unseen(start, (), ()) is start
+
+
+@pytest.mark.parametrize(
+    ("by_each", "cost", "kept"),
+    [((20.0, 40.0), 10.0, 41.0), ((20.0, 9.0), 10.0, 41.0), ((9.0, 9.5), 10.0, 0.0)],
+)
+def test_a_word_alone_asks_first_where_it_then_explains_more_than_all_did(
+    monkeypatch: pytest.MonkeyPatch, by_each: tuple[float, float], cost: float, kept: float
+) -> None:
+    """Of two words the one that explains more by its loads, less what these cost; then all words
+    are searched along them."""
+    words = ("joint_hysteresis", "joint_yield")
+    loads = [SimpleNamespace(words=frozenset({w}), cost=cost) for w in words]
+    whole, start = result(41.0, True, left=0.0), result(0.0, True)
+    along = dict(zip(words, map(result, by_each, (True, True), strict=True), strict=True))
+    Rounds(monkeypatch)
+    monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(loads))
+    monkeypatch.setattr(diagnose, "unseen", lambda *_: None)
+    asked = []
+
+    def searched(_: Any, more: Any, known: Any, withheld: set[str]) -> Any:
+        asked.append(next(iter(more.words)))
+        return along[asked[-1]] if withheld else whole
+
+    monkeypatch.setattr(diagnose, "_along", searched)
+    found = diagnose._with_unseen(start, (), ())
+    assert found.explanations[0].log_weight == kept
+    ahead = words[int(by_each[1] > by_each[0])]
+    assert asked == [*words, *([ahead] if kept else [])]
+
+
+def test_a_word_alone_that_all_others_do_not_bear_out_is_dropped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    loads = SimpleNamespace(words=frozenset({WORD}), cost=10.0)
+    start = result(0.0, True)
+    Rounds(monkeypatch)
+    monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter((loads,)))
+    monkeypatch.setattr(diagnose, "unseen", lambda *_: None)
+    monkeypatch.setattr(diagnose, "_along", lambda *given: result(20.0 if given[-1] else 9.0, True))
     assert diagnose._with_unseen(start, (), ()) is start

@@ -31,6 +31,7 @@ from identification.gap.explanations.verdict import (
 )
 from identification.gap.judging.broken import broken
 from identification.gap.judging.dead_zone import spoken_for
+from identification.gap.judging.earned import noise_of, sample_rms
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.late import but_lags
 from identification.gap.judging.paths import goes_as_no_drift
@@ -48,6 +49,9 @@ COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whe
 BUT_A_LAG = 1e4  # nats against a creep that is but a lag: beyond what any data bring
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
+# Times the noise that samples miss where nothing is said to be wrong: faster than rows tell, what
+# swings so is no noise, which their second differences would show.
+SWINGS = 2.5
 # What takes any path in time is bound by no law that could be off: as the main cause it leaves
 # hardly anything of what springs leave. Of a stand that slips once, and stays there, it leaves a
 # sixth beside the jump; the drifts of the blind check leave 0.03 at most.
@@ -71,7 +75,10 @@ def looked_up(found: SearchResult) -> SearchResult:
         off = most_off(engine, fitted)
         if not engine.bench.data.arm:  # nothing is wrong while springs and gains are as stated
             share = kept_within(off, AS_STATED)
-            done[none.words] = _less_likely(none, -float(np.log(max(share, 1e-300))))
+            less = _less_likely(none, -float(np.log(max(share, 1e-300))))
+            if sample_rms(engine.bench, fitted.whole(engine)) > SWINGS * noise_of(engine.bench):
+                less = replace(less, log_good=less.log_good + log(FAULTY))
+            done[none.words] = less
             continue
         asked = max(strain(engine, fitted, none.eta), off * LIMIT / ARM_AS_STATED)
         done[none.words] = _unstrained(none, asked)

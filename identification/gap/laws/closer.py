@@ -89,6 +89,11 @@ def closing_in(
                 break
             fresh = refined(engine.bench, best, share)
         finer += fresh
+    return near(finer, found)
+
+
+def near(finer: list[Variant], found: list[Scored]) -> list[Variant]:
+    """Those that were not found to be far worse than the best of what was found."""
     best_of = max(map(evidence, found), default=0.0)
     far = {s.variant for s in found if s.log_evidence < best_of - _FAR}
     return [v for v in finer if v not in far]

@@ -60,17 +60,19 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     """Thresholds about that of a knee that was found with coefficients w (k,): of the sharp one of
     the same end and work. It lies between two neighbours, and hardens on or softens, or not. close:
     share of the steps."""
-    info, load, radius = found.info, np.asarray(found.info["load"]), np.asarray(found.info["radius"])
-    top, w = float(np.abs(load).max()), np.maximum(w, 0.0)
+    info, load, radius = (
+        found.info,
+        np.asarray(found.info["load"]),
+        np.asarray(found.info["radius"]),
+    )
+    top = float(np.abs(load).max())
     beyond = np.maximum(top - radius, 0.0)
     path = float(w @ beyond)
     knee = top - float(w @ beyond**2) / path if path > 0 else 0.0
-    if not knee > 0:
+    if not 0 < knee < top:
         return []
     radius = knee * (1 + close * _FINE)
-    columns = [
-        info["column"](s) for s in grown(load, radius, _memories(bench)[info["memory"]]).T
-    ]
+    columns = [info["column"](s) for s in grown(load, radius, _memories(bench)[info["memory"]]).T]
     place = {key: info[key] for key in info if key not in _OWN}
     out, share = [], _FINE_PRIOR / len(radius) / 2
     for k, r in enumerate(radius[:-1]):

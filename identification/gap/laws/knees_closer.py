@@ -16,6 +16,7 @@ from identification.gap.laws.closer import (
     closing_in,
     estimate,
     evidence,
+    near,
     places,
     scored_beside,
     shows,
@@ -55,6 +56,7 @@ def finer(word: Word, between: Between | None = None) -> list[Variant]:
     flat = [v for s in best for v in plateaus(word.engine.bench, s.variant)]
     firm = places(word.alone, word.beside, lambda v: bool(v.info["knee"] == HARDENED))
     lasts = closing_in(word, partial(_hardened, word), firm, CLOSE)
+    lasts = near(lasts, scored_beside(word.engine, word.families, word.ranked, lasts))
     return closer + flat + lasts + _elsewhere(word, closer, between)
 
 

@@ -55,7 +55,10 @@ def force_without_load(rows: Rows, noise: float, *, tared: bool) -> Array:
             continue
         if (end := float(rows.session[mine].max())) > time[-1] > time[0]:
             rate = (force[-1] - force[0]) / (time[-1] - time[0])
-            time, force = np.append(time, end), np.append(force, force[-1] + rate * (end - time[-1]))
+            time, force = (
+                np.append(time, end),
+                np.append(force, force[-1] + rate * (end - time[-1])),
+            )
         out[mine] = np.interp(rows.session[mine], time, force)
     return out
 
