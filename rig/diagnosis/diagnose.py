@@ -36,8 +36,9 @@ _JOINT = re.compile(r"\bjoint(s?(?: but)?)(?: (\d+))?(?: and (\d+))?")
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The result with what it came from; `to_json` is schema rig.diagnosis/1. known_effects: of
-    the model that was given, part of the simulation, but for what is gone since; left_behind: words of that model which belong
-    to the session that it was made from, and are no part of it; model: the model itself."""
+    the model that was given, part of the simulation, but for what is gone since; left_behind: words
+    of that model which belong to the session that it was made from, and are no part of it; model:
+    the model itself."""
 
     dataset: str
     result: GapResult

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from identification.gap.data import GapData
+from identification.gap.model.bench import make_bench
 from identification.gap.recording.digits import as_fine_as_digits, step_of
 from rig.diagnosis.diagnose_text import render
 from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 5e-7  # m/N
@@ -91,3 +93,35 @@ def test_what_digits_leave_is_no_gap(laser_m: float, converter_N: float) -> None
 def test_a_curve_beyond_its_digits_is_still_seen() -> None:
     found = explained(read(5e-6, bends=0.4))
     assert found.verdict == "joint_nonlinear_stiffness"
+
+
+def linear_arm(step_rad: float, scatter_rad: float = 0.0) -> GapData:
+    """As simulated; joints are read in steps, from places of their own within one."""
+    there, rng = arm_data(), np.random.default_rng(7)
+    force = np.round(there.force / 40.0) * 40.0
+    lever = np.stack([s.lever for s in there.setups])[there.setup]
+    turned = force[:, None] * lever * there.compliance
+    read = turned + rng.uniform(-0.5, 0.5, 6) * step_rad + rng.normal(0, scatter_rad, turned.shape)
+    return replace(
+        there,
+        force=force + rng.normal(0, 0.05, len(force)),
+        displacement=np.sum(lever * turned, axis=1) + rng.normal(0, 2e-6, len(force)),
+        q=step_rad * np.round(read / step_rad),
+        instruments=replace(there.instruments, force=0.1, displacement=2e-6),
+        temperature=None,
+    )
+
+
+@pytest.mark.parametrize("scatter_rad", [0.0, 2e-6, 1e-4])
+def test_digits_of_joint_readings_are_no_gap(scatter_rad: float) -> None:
+    """Four decimals, as an export leaves them, of which a joint passes twenty at most."""
+    assert explained(linear_arm(1e-4, scatter_rad)).verdict == "none"
+
+
+def test_readings_of_one_number_tell_no_more_however_often_they_are_taken() -> None:
+    noise = make_bench(linear_arm(1e-4)).noise
+    assert (noise.q >= 1e-4 / 12**0.5).all()
+    assert noise.q_hold.min() > 1e-4 / 12**0.5  # every number comes at both repetitions
+    assert noise.q_hold.max() <= 1e-4 / 12**0.5 * noise.q_hold.shape[1] ** 0.5
+    assert not make_bench(linear_arm(1e-4, 1e-4)).noise.q_hold.any(), "these scatter over steps"
+    assert not make_bench(linear_arm(1e-7, 1e-5)).noise.q_hold.any()

@@ -158,7 +158,7 @@ def test_a_word_alone_asks_first_where_it_then_explains_more_than_all_did(
     words = ("joint_hysteresis", "joint_yield")
     loads = [SimpleNamespace(words=frozenset({w}), cost=cost) for w in words]
     whole, start = result(41.0, True, left=0.0), result(0.0, True)
-    along = dict(zip(words, map(result, by_each, (True, True), strict=True), strict=True))
+    along = dict(zip(words, [result(value, True) for value in by_each], strict=True))
     Rounds(monkeypatch)
     monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(loads))
     monkeypatch.setattr(diagnose, "unseen", lambda *_: None)

@@ -10,9 +10,8 @@ import pytest
 
 from identification.gap.data import GapData, Instruments
 from identification.gap.effects import joint_creep
-from identification.gap.laws.law import Law, Term
 from identification.gap.model.bench import make_bench
-from identification.gap.model.history import retarded, rests
+from identification.gap.model.history import rests, retarded
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
@@ -114,4 +113,5 @@ def test_the_law_of_a_model_says_for_which_share_it_stood() -> None:
 
 def test_two_close_times_of_which_one_goes_back_are_no_creep() -> None:
     assert not joint_creep._grows(np.array([-1.0, 1.5]))
-    assert joint_creep._grows(np.array([0.0, 1.5])) and joint_creep._grows(np.array([1.5, -0.01]))
+    assert joint_creep._grows(np.array([0.0, 1.5]))
+    assert joint_creep._grows(np.array([1.5, -0.01]))

@@ -90,12 +90,13 @@ def is_gone(found: SearchResult, without: SearchResult) -> bool:
     """Whether the same is explained as well, or far better, by a simulation without an effect that
     is in question: then it is not there as the model has it."""
     best, again = found.explanations[0], without.explanations[0]
-    as_well = again.eta <= max(best.eta, without.engine.bench.noise.stated)
+    as_well = again.eta <= max(best.eta, _CLOSELY * without.engine.bench.noise.stated)
     return as_well or again.log_weight > best.log_weight + _GONE
 
 
 _SAID = "known "  # so begin the names of what is not known of the simulation's effects
 _OFF, _GONE = 2.5, 20.0  # standard deviations; nats
+_CLOSELY = 1.5  # of the noise: sizes of imperfection are as coarse
 
 
 def _with_known(bench: Bench, forms: Sequence[Form]) -> Bench:

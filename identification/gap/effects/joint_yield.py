@@ -29,16 +29,11 @@ from identification.gap.laws.effect import Effect
 from identification.gap.laws.flow_back import flowing_back
 from identification.gap.laws.flows import Flow
 from identification.gap.laws.interval import Parameter
-from identification.gap.laws.knees import (
-    THRESHOLDS,
-    fresh_of,
-    knee_variants,
-    knees,
-    memories,
-)
+from identification.gap.laws.knees import THRESHOLDS, knee_variants, knees
 from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
 from identification.gap.laws.lasting import SCALES
 from identification.gap.laws.law import Law, Laws
+from identification.gap.laws.memories import fresh_of, memories
 from identification.gap.laws.specimens import OWN, off, own_stiffness, with_other_springs
 from identification.gap.laws.thresholds import moved, of_knee
 from identification.gap.model.bench import TOOL_SD_KG, Bench

@@ -9,9 +9,10 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.laws.lasting import HARDENS, lasting
+from identification.gap.laws.memories import LIKELY, memories
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import whiles
-from identification.gap.model.variants import SET_UP_ANEW, Variant
+from identification.gap.model.variants import Variant
 from identification.gap.recording.turns import way_back
 
 HARDENED = "hardened"  # its knee
@@ -46,12 +47,12 @@ def hardened(
     ):
         radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
     out = []
-    for memory, fresh in _memories(bench).items():
+    for memory, fresh in memories(bench).items():
         columns = [column(s) for s in grown(load, radius, fresh).T]
         facts = {**info, "memory": memory, "load": load, "column": column}
         for k, r in enumerate(radius):
             label = f"{name}{memory} {HARDENED} beyond {r / top:.3g}"
-            share = _PRIOR / len(radius)
+            share = _PRIOR * LIKELY[memory] / len(radius)
             out.append(_shape(word, label, columns[k:], radius[k:], share, facts))
     return out
 
@@ -72,7 +73,7 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     if not 0 < knee < top:
         return []
     radius = knee * (1 + close * _FINE)
-    columns = [info["column"](s) for s in grown(load, radius, _memories(bench)[info["memory"]]).T]
+    columns = [info["column"](s) for s in grown(load, radius, memories(bench)[info["memory"]]).T]
     place = {key: info[key] for key in info if key not in _OWN}
     out, share = [], _FINE_PRIOR / len(radius) / 2
     for k, r in enumerate(radius[:-1]):
@@ -84,14 +85,6 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
 
 _NEIGHBOURS = 2
 _OWN = ("radius", "centre", "flow_s", "back", "knee")  # facts of a shape rather than of its place
-
-
-def _memories(bench: Bench) -> dict[str, Flags]:
-    """When it is as new: in another pose, or when the rig was turned to another direction, too."""
-    out = {"": bench.moved}
-    if np.sum(bench.rebuilt) > np.sum(bench.moved):
-        out[SET_UP_ANEW] = bench.rebuilt
-    return out
 
 
 def _shape(

@@ -8,20 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from identification.arrays import Array, Flags
+from identification.arrays import Array
 from identification.gap.laws.flow_back import flowing_back, yielded_from
 from identification.gap.laws.hardened import hardened
 from identification.gap.laws.lasting import HARDENS, LEAST, SCALES
+from identification.gap.laws.memories import LIKELY, fresh_of, memories
 from identification.gap.laws.specimens import softening
 from identification.gap.laws.walks import walking
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (
-    BACK_UNDER_WEIGHT,
     CALLED,
-    LASTING,
-    SET_UP_ANEW,
     TAKEN_BACK,
-    UNDER_WEIGHT,
     Variant,
     block,
     smooth_root,
@@ -29,15 +26,6 @@ from identification.gap.model.variants import (
 )
 
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
-# A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {
-    "": 1.0,
-    LASTING: 0.5,
-    SET_UP_ANEW: 0.5,
-    TAKEN_BACK: 0.3,
-    UNDER_WEIGHT: 1.0,
-    BACK_UNDER_WEIGHT: 0.3,
-}
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
 # Bauschinger's effect: after a reversal metal yields earlier than at first.
@@ -98,7 +86,7 @@ def knees(
     1943). What is pulled once, without an arm, may soften. name: joint or axis, and memory, with
     which labels begin."""
     info = {**info, CALLED: name}
-    arm, share = bench.data.arm, 0.7 / len(radius) * _LIKELY[info["memory"]]
+    arm, share = bench.data.arm, 0.7 / len(radius) * LIKELY[info["memory"]]
     softens = not arm and not bench.course.unloads
     extra, out = list(range(len(THRESHOLDS), len(radius))), []
     for k in range(_FIRST, len(THRESHOLDS)):
@@ -125,7 +113,7 @@ def knees(
             "knee": "slow",
             "softens": False,
         }
-        at, likely = f"{name} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
+        at, likely = f"{name} at {THRESHOLDS[0]:g} and on", _SLOW * LIKELY[info["memory"]]
         root = smooth_root(len(radius), 0.6, 0.3)
         out += with_back(word, at, columns, root, likely, exact)
     return out
@@ -168,23 +156,3 @@ _RETURNS = 0.4  # coefficients of what flows back, against those of the knee
 def is_sharp(v: Variant) -> bool:
     """Whether the threshold is one of the grid, without rounding: about such it is refined."""
     return bool(v.info["knee"] == "sharp")
-
-
-def memories(bench: Bench) -> dict[str, Flags]:
-    """When the joint gets back to where it was: never, when the arm moves, when the rig is turned
-    to another direction (the arm may be sent away meanwhile), before every run."""
-    moved, first = bench.moved, np.zeros(bench.rows.n, dtype=bool)
-    out = {"": moved}
-    if np.sum(moved) > 1:
-        out[LASTING] = first
-    if np.sum(bench.rebuilt) > np.sum(moved):
-        out[SET_UP_ANEW] = bench.rebuilt
-    if np.sum(bench.rest) > np.sum(moved):
-        out[TAKEN_BACK] = moved | bench.rest
-    return out
-
-
-def fresh_of(bench: Bench, memory: str) -> Flags:
-    """(n,) rows before which a joint of that memory is where it was."""
-    lost = TAKEN_BACK if memory == BACK_UNDER_WEIGHT else memory
-    return memories(bench).get(lost, bench.moved)

@@ -23,8 +23,9 @@ from identification.gap.laws.closer import (
 )
 from identification.gap.laws.flows import Flow
 from identification.gap.laws.hardened import HARDENED
-from identification.gap.laws.knees import FLOWS_BACK, fresh_of, is_sharp, with_back
+from identification.gap.laws.knees import FLOWS_BACK, is_sharp, with_back
 from identification.gap.laws.lasting import SCALES
+from identification.gap.laws.memories import fresh_of
 from identification.gap.laws.specimens import OWN, plateaus, with_other_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (

@@ -18,8 +18,8 @@ ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q again
 
 
 class Readings(NamedTuple):
-    """Standard deviations, rad: of one reading (m,); of what digits leave of every hold's (m, h); of
-    what all readings of a run are off by, and all of a setup, each joint by its own."""
+    """Standard deviations, rad: of one reading (m,); of what digits leave of a hold's (m, h); of
+    what all of a run are off by, and all of a setup, each joint by its own."""
 
     one: Array
     hold: Array

@@ -74,6 +74,8 @@ def _plateaus(rows: Rows, mine: Ints) -> list[tuple[float, float, float]]:
     for rest in np.split(zero, apart):
         if rest.size and rows.weight[rest].sum() > 0:
             w = rows.weight[rest]
-            at = (np.average(v[rest], weights=w) for v in (rows.session, rows.measured_force))
-            out.append((*map(float, at), float(w.sum())))
+            time, force = (
+                float(w @ v[rest] / w.sum()) for v in (rows.session, rows.measured_force)
+            )
+            out.append((time, force, float(w.sum())))
     return out

@@ -1,0 +1,87 @@
+"""Joints that give way alike in both senses: beyond the largest load they have borne, and not back
+when they are unloaded from more than twice their threshold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.data import GapData
+from identification.gap.effects import library
+from identification.gap.laws import hardened
+from identification.gap.laws.memories import memories
+from identification.gap.model.bench import make_bench
+from identification.gap.model.variants import SET_UP_ANEW, TAKEN_BACK
+from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
+
+THRESHOLD_NM, ADDED = 43.0, 1.5
+
+
+def gives_way(memory: str) -> GapData:
+    """Joint 1, by 1.5 times its compliance; it is as it was at the beginning of every run, in
+    another direction, or in another pose only."""
+    there, rng = arm_data(), np.random.default_rng(7)
+    force = np.round(there.force / 40.0) * 40.0
+    setup = np.array([[s.pose, s.direction] for s in there.setups])[there.setup]
+    kept = {
+        TAKEN_BACK: np.char.add(np.char.add(*setup.T), there.run.astype(str)),
+        SET_UP_ANEW: np.char.add(*setup.T),
+        "": setup[:, 0],
+    }[memory]
+    lever = np.stack([s.lever for s in there.setups])[there.setup]
+    torque = force[:, None] * lever
+    turned = torque * there.compliance
+    for one in np.unique(kept):
+        mine = kept == one
+        most = np.maximum.accumulate(np.maximum(np.abs(torque[mine, 0]) - THRESHOLD_NM, 0.0))
+        way = np.cumsum(np.sign(torque[mine, 0]) * np.diff(most, prepend=0.0))
+        turned[mine, 0] += ADDED * there.compliance[0] * way
+    return replace(
+        there,
+        force=force + rng.normal(0, 0.05, len(force)),
+        displacement=np.sum(lever * turned, axis=1) + rng.normal(0, 2e-6, len(force)),
+        q=turned + rng.normal(0, 1e-5, turned.shape),
+        instruments=replace(there.instruments, force=0.1, displacement=2e-6),
+        temperature=None,
+    )
+
+
+@pytest.mark.parametrize("memory", ["", SET_UP_ANEW, TAKEN_BACK])
+def test_it_is_a_yield_and_its_threshold_is_found(memory: str) -> None:
+    """The torque goes to 123 Nm, and flows back by no law of kinematic hardening."""
+    found = explained(gives_way(memory))
+    assert found.verdict == "joint_yield"
+    assert found.after < 1.3 * found.noise
+    values = found.effects[0].parameters
+    assert values["threshold"].low <= THRESHOLD_NM <= values["threshold"].high
+    assert values["threshold"].high - values["threshold"].low < 0.15 * THRESHOLD_NM
+    slope = values["slope_beyond_over_elastic"]
+    assert slope.low <= ADDED <= slope.high
+
+
+def test_a_closer_look_lies_about_the_knee_that_several_radii_make_together() -> None:
+    bench = make_bench(gives_way(""))
+    whole = next(
+        v
+        for v in library(bench, ["joint_yield"])
+        if v.info["knee"] == hardened.HARDENED and v.joint == 0 and v.info["memory"] == ""
+    )
+    radius = np.asarray(whole.info["radius"])
+    w = np.zeros(len(radius))
+    w[np.abs(radius - THRESHOLD_NM).argsort()[:2]] = 1.0
+    found = hardened.refined(bench, whole, w)
+    centres = np.array([v.info["centre"] for v in found])
+    assert centres.min() < THRESHOLD_NM < centres.max()
+    assert np.ptp(centres) < 0.5 * THRESHOLD_NM
+    closer = hardened.refined(bench, whole, w, 0.4)
+    assert np.ptp([v.info["centre"] for v in closer]) < 0.5 * np.ptp(centres)
+    assert hardened.refined(bench, whole, -w) == []
+
+
+def test_it_remembers_as_all_knees_do() -> None:
+    bench = make_bench(gives_way(""))
+    mine = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == hardened.HARDENED]
+    assert {v.info["memory"] for v in mine} == set(memories(bench))
