@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.laws.lasting import HARDENS, lasting
+from identification.gap.laws.lasting import HARDENS, SCALES, lasting
 from identification.gap.laws.memories import LIKELY, memories
+from identification.gap.laws.specimens import OWN, with_other_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import whiles
 from identification.gap.model.variants import Variant
@@ -61,12 +62,9 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     """Thresholds about that of a knee that was found with coefficients w (k,): of the sharp one of
     the same end and work. It lies between two neighbours, and hardens on or softens, or not. close:
     share of the steps."""
-    info, load, radius = (
-        found.info,
-        np.asarray(found.info["load"]),
-        np.asarray(found.info["radius"]),
-    )
-    top = float(np.abs(load).max())
+    info, load = found.info, np.asarray(found.info["load"])
+    top, radius = float(np.abs(load).max()), np.asarray(info["radius"])
+    w = w[: len(radius)]  # what else there is is a spring beside it
     beyond = np.maximum(top - radius, 0.0)
     path = float(w @ beyond)
     knee = top - float(w @ beyond**2) / path if path > 0 else 0.0
@@ -80,11 +78,14 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
         for last in dict.fromkeys((k + 2, len(radius))):
             label = f"{found.label.partition(HARDENED)[0]}{HARDENED} beyond {r:.4g} fine"
             out.append(_shape(found.word, label, columns[k:last], radius[k:last], share, place))
+    if found.other_springs:
+        return with_other_springs(bench, int(info["joint"]), out, SCALES, OWN)
     return out
 
 
 _NEIGHBOURS = 2
-_OWN = ("radius", "centre", "flow_s", "back", "knee")  # facts of a shape rather than of its place
+# facts of a shape rather than of its place
+_OWN = ("radius", "centre", "flow_s", "back", "knee", "other_springs")
 
 
 def _shape(
