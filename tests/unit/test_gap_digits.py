@@ -87,7 +87,13 @@ def test_what_digits_leave_is_no_gap(laser_m: float, converter_N: float) -> None
     assert found.verdict == "none"
     text = render(found)
     assert ("displacement is read in steps of 0.005 mm" in text) is (laser_m > 0)
-    assert ("force is read in steps of 0.488 N" in text) is (converter_N > 0)
+    assert (f"force is read in steps of {converter_N:.3g} N" in text) is (converter_N > 0)
+
+
+def test_readings_of_a_force_at_one_number_are_not_many() -> None:
+    """A laser far better than what the converter of the force leaves."""
+    fine = (0.02, 1e-8)
+    assert explained(read(0.0, 0.488, noise=fine, stated=fine)).verdict == "none"
 
 
 def test_a_curve_beyond_its_digits_is_still_seen() -> None:

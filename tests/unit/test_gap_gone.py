@@ -100,6 +100,16 @@ def test_a_drift_beside_it_leaves_it_where_it_is() -> None:
     assert (result.verdict, result.gone) == ("force_drift", ())
 
 
+@pytest.mark.parametrize("drift_N", [0.0, 8.0])
+def test_thresholds_are_met_by_the_true_force(drift_N: float) -> None:
+    """Not by what an amplifier reads that has drifted."""
+    data = arm(drift_N=drift_N)
+    values = explain_gap(data)[0].effects[0].parameters
+    lever = max(abs(s.lever[0]) for s in data.setups if s.direction == "y")
+    assert values["threshold"].value == pytest.approx(60.0, rel=0.015)
+    assert values["onset_y"].value == pytest.approx(60.0 / lever, rel=0.015)
+
+
 @pytest.mark.parametrize(
     ("eta", "log_weight", "gone"),
     [(2.9e-6, -500.0, True), (4e-6, -500.0, False), (4e-6, 15.0, False), (4e-6, 25.0, True)],

@@ -57,7 +57,7 @@ def test_it_is_a_yield_and_its_threshold_is_found(memory: str) -> None:
     assert found.after < 1.3 * found.noise
     values = found.effects[0].parameters
     assert values["threshold"].low <= THRESHOLD_NM <= values["threshold"].high
-    assert values["threshold"].high - values["threshold"].low < 0.15 * THRESHOLD_NM
+    assert values["threshold"].value == pytest.approx(THRESHOLD_NM, rel=0.01)
     slope = values["slope_beyond_over_elastic"]
     assert slope.low <= ADDED <= slope.high
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, Ints
 from identification.gap.data import GapData
-from identification.gap.recording.digits import in_one_number, step_of
+from identification.gap.recording.digits import in_one_number, left_of, step_of
 from identification.gap.recording.holds import ENOUGH, scatter_within
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.white import QUARTILE
@@ -30,7 +30,7 @@ class Readings(NamedTuple):
 def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
     """From what the joints read while the arm rests in holds (n,), and at zero load."""
     one, rounded = _one(data, rows, hold), np.zeros((data.joints, len(rows.edges)))
-    if data.q is None or rows.continuous:
+    if data.q is None or rows.q is None or rows.continuous:
         return Readings(one, rounded, 0.0, 0.0)
     first = np.unique(data.setup, return_index=True)[1]
     turned = data.q - data.q[first][np.unique(data.setup, return_inverse=True)[1]]
@@ -38,17 +38,9 @@ def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
     for j, step in enumerate(common or step_of(q) for q in turned.T):
         one[j] = max(one[j], step / 12**0.5)
         if step > 0 and in_one_number(data.q[:, j], hold):
-            rounded[j] = _rounded(rows, j, step)
+            means = rows.hold_means(rows.q[:, j])
+            rounded[j] = left_of(means, rows.setup[rows.edges], step)
     return Readings(one, rounded, *_between_runs(data, rows, one))
-
-
-def _rounded(rows: Rows, joint: int, step: float) -> Array:
-    """(h,) rad that digits leave of the readings of a joint in every hold. Holds of a setup that
-    read the same are off by about the same, and together tell no more than one."""
-    assert rows.q is not None
-    code = np.round(rows.hold_means(rows.q[:, joint]) / step)
-    same = np.unique(np.stack([rows.setup[rows.edges], code]), axis=1, return_inverse=True)[1]
-    return np.asarray(step / 12**0.5 * np.sqrt(np.bincount(same.ravel())[same.ravel()]))
 
 
 def _one(data: GapData, rows: Rows, hold: Ints) -> Array:

@@ -10,7 +10,7 @@ from identification.arrays import Array, Ints
 from identification.gap.data import GapData
 from identification.gap.model.driven import steepness
 from identification.gap.model.encoders import readings_of
-from identification.gap.recording.digits import digit_of, in_one_number
+from identification.gap.recording.digits import digit_of, in_one_number, left_of
 from identification.gap.recording.holds import (
     hold_ids,
     rest_ids,
@@ -76,8 +76,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
     of_force = meter.force / np.sqrt(rows.hold_weight)
-    if digit_of(data, "force") > 0:
-        of_force = np.maximum(of_force, _rounded(data.force, meter.force, hold))
+    if (step := digit_of(data, "force")) > 0 and in_one_number(data.force, hold):
+        means = rows.hold_means(rows.measured_force)
+        of_force = np.maximum(of_force, left_of(means, rows.setup[rows.edges], step)[rows.hold])
     common = np.where(rows.steady, steep * of_force, 0.0)
     whites = _whites(data) if rows.continuous else (0.0, 0.0)
     if rows.continuous:
@@ -106,9 +107,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         less = data.displacement - float(np.median(slope)) * data.force
         follows = _scatter(data, less, hold)
         raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
-    rounded = 0.0
-    if not (rows.continuous or imposed):
-        rounded = _rounded(data.displacement, meter.displacement, hold)
+    rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
     readings = readings_of(data, rows, hold)
     per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
     return Noise(
@@ -156,15 +155,16 @@ _TOGETHER = 0.02
 _LITTLE = 2.0  # times what is stated: what scatters more was misjudged
 
 
-def _rounded(values: Array, stated: float, hold: Ints) -> float:
-    """What all readings (n,) of a hold are off by together because the sensor rounds them, and they
-    scatter by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
+def _rounded(data: GapData, hold: Ints) -> float:
+    """What all readings of a hold are off by together (m) because the sensor rounds them, and
+    scatters by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
     stated of one; 0 where they scatter."""
-    if not in_one_number(values, hold):
+    u = data.displacement
+    if not in_one_number(u, hold):
         return 0.0
-    steps = np.diff(np.unique(values))
-    real = steps[steps > _SAME * float(np.ptp(values))]
-    return min(float(real.min(initial=np.inf)) / 12**0.5, stated)
+    steps = np.diff(np.unique(u))
+    real = steps[steps > _SAME * float(np.ptp(u))]
+    return min(float(real.min(initial=np.inf)) / 12**0.5, data.instruments.displacement)
 
 
 _SAME = 1e-9  # of the range: digits that a conversion of units leaves

@@ -44,6 +44,13 @@ def in_one_number(values: Array, hold: Ints) -> bool:
     return bool(again.sum() >= ENOUGH and np.mean(np.diff(values)[again] == 0) >= _ONE_NUMBER)
 
 
+def left_of(means: Array, setup: Ints, step: float) -> Array:
+    """(h,) what digits leave of the means (h,) of holds that stay at one number. Holds of a setup
+    that read the same are off by about the same, and together tell no more than one."""
+    same = np.unique(np.stack([setup, np.round(means / step)]), axis=1, return_inverse=True)[1]
+    return np.asarray(step / 12**0.5 * np.sqrt(np.bincount(same.ravel())[same.ravel()]))
+
+
 def digit_of(data: GapData, channel: str) -> float:
     """Step (N, m) in which a channel is read; 0 where none shows, or where it may be what was set
     rather than read."""
