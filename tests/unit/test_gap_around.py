@@ -193,6 +193,23 @@ def test_explanations_that_matter_are_taken_between_the_levels(
     assert asked == []
 
 
+@pytest.mark.parametrize(("behind", "asked_for"), [(15.0, True), (80.0, True), (100.0, False)])
+def test_what_a_second_effect_brings_is_counted_between_the_levels_for_both(
+    monkeypatch: pytest.MonkeyPatch, behind: float, asked_for: bool
+) -> None:
+    """Else it would seem to bring what the best explanation gains there, 78 nats."""
+    engine = small_engine(small_bench())
+    monkeypatch.setattr("identification.gap.search.search.gained", lambda *_: 78.0)
+    friction, gain, lag = (part(w, [0]) for w in ("joint_hysteresis", "force_scale", "time_lag"))
+    both, alone = said((gain, friction), (2e-5, 1e-5), 0.0), said((friction,), (1e-5,), -behind)
+    other = said((lag,), (1e-5,), -15.0)
+    found = _sharpened(engine, [both, other, alone, said((), (), -900.0)])
+    weight = {e.words: e.log_weight for e in found}
+    assert weight[both.words] == 78.0
+    assert weight[alone.words] == 78.0 * asked_for - behind
+    assert weight[other.words] == -15.0, "no part of the best, and too far off to matter"
+
+
 def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> None:
     """No law meets a rig to the noise of these data, however well it fits: what is weighed beside
     it must not be held to less imperfection than it has itself."""

@@ -132,6 +132,22 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         assert with_posterior(both, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
 
 
+def test_of_three_effects_of_which_two_bring_little_the_third_is_the_main_one() -> None:
+    bench = small_bench()
+    found = search(small_engine_of(bench), library(bench, ["joint_hysteresis"]))
+    on_arm = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=True)))
+    gain, springs, friction = (
+        part(w, [0]) for w in ("force_scale", "joint_stiffness_error", "joint_hysteresis")
+    )
+    three = said((gain, springs, friction), (1e-4, 7e-5, 3e-5), 0.0)
+    two = said((gain, friction), (4e-5, 3e-5), -3.0)
+    for brings, main in ((12.0, "joint_hysteresis"), (40.0, "force_scale")):
+        alone = said((friction,), (3e-5,), -3.0 - brings)
+        case = replace(found, engine=on_arm, explanations=(three, two, alone), unknown=-800.0)
+        probabilities = with_posterior(case, {}).probabilities
+        assert max(probabilities, key=lambda w: probabilities[w]) == main
+
+
 def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:
     bench = small_bench()
     variants = library(bench, ["joint_creep"])

@@ -66,6 +66,8 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
         fewer = simpler_of(e, ranked, kept, arm=arm)
+        while fewer is not None and (still := simpler_of(fewer, ranked, kept, arm=arm)):
+            fewer = still
         said = found.speaker_for(e) or found.speaker_for(fewer) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         three = arm and _tells_of_three(said, ranked)

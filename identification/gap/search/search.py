@@ -33,7 +33,8 @@ from identification.gap.words import MECHANISMS, NAMELESS, SPRINGS
 # factor of two.
 _SURE_SHARE, _UNSURE_SHARE = 0.05, 0.2
 _STEP = 0.6  # of the noise: between the least size of an imperfection and the next
-_SHARPENED = 8  # explanations at the most
+_SHARPENED = 12  # explanations at the most
+_BROUGHT = 90.0  # nats: the most that any effect is asked to bring beside others
 _PROMISING = 7  # further words of an explanation that are looked at closely
 # Explanations around which another effect is looked for. Of an arm, further ones cost a fifth of
 # the time and change no verdict in 300 cases; on a bench the two that belong together may both look
@@ -307,21 +308,27 @@ def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explan
 
 
 def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
-    """With the evidence of those that matter between the levels of imperfection, best first. What
-    was stated was looked at between them before, and shuts out nobody by what it gained there; but
-    for what laws of the simulation's own effects may leave."""
+    """With the evidence of those that matter between the levels of imperfection, best first: of
+    what is near the best, and of what that is compared with for what its further effects bring.
+    What was stated was looked at between them before, and shuts out nobody by what it gained there;
+    but for what laws of the simulation's own effects may leave."""
     done: dict[frozenset[str], Explanation] = {}
     stated = engine.levels[0].log_base + LOG_NONE if engine.bench.known is None else np.inf
     first = max(e.log_weight if e.parts else min(e.log_weight, stated) for e in ranked)
+    most = 0.0
     for _ in range(_SHARPENED):
         ranked = sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
-        least = min(first, ranked[0].log_weight) - _WINDOW / 2  # what is not done yet may gain, too
-        near = [e for e in ranked if e.log_weight > least]
-        todo = [e for e in near if e.parts and e.words not in done]
-        if not todo:
+        best = ranked[0].log_weight
+        least = min(first, best) - _WINDOW / 2  # what is not done yet may gain, too
+        todo = [e for e in ranked if e.parts and e.words not in done]
+        near = [e for e in todo if e.log_weight > least]
+        simpler = (e for e in todo if any(e.words < words for words in done))
+        asked = [*near, *(e for e in simpler if e.log_weight > best - most - _BROUGHT)]
+        if not asked:
             break
-        e = todo[0]
+        e = asked[0]
         level = int(np.argmin(np.abs(engine.etas - e.eta)))
         more = gained(engine, e.parts, part_sizes(engine, e.parts, level).energy)
+        most = max(most, more)
         done[e.words] = replace(e, log_weight=e.log_weight + more, log_good=e.log_good + more)
     return sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
