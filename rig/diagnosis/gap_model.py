@@ -48,9 +48,13 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
         made = "Nothing explains the measured gap: the springs are those that were given."
     given = diagnosis.model.note if diagnosis.model is not None else ""
     note = " ".join([*diagnosis.banners, made, *([f"Given: {given}"] if given else [])])
+    sure = likely(result.probabilities[result.verdict])
+    found = {
+        "none": f"in which rig diagnose found nothing missing ({sure})",
+        "unknown": f"as it was given: what is missing in it is unknown ({sure})",
+    }.get(result.verdict, f"with what rig diagnose found missing in it: {result.verdict} ({sure})")
     lines = [
-        f"# The simulation with what rig diagnose found missing in it: {result.verdict} "
-        f"({likely(result.probabilities[result.verdict])}).",
+        f"# The simulation {found}.",
         f"# Data set: {dataset.uuid}",
         f"note: {json.dumps(note)}",
         *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *_believed(result)),

@@ -237,6 +237,22 @@ def test_of_an_unknown_gap_no_spring_is_made(
     assert dataset.uuid not in note  # it may be a prior for these data: nothing of them is in it
 
 
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        ("none", "in which rig diagnose found nothing missing"),
+        ("unknown", "as it was given: what is missing in it is unknown"),
+        ("joint_creep", "with what rig diagnose found missing in it: joint_creep"),
+    ],
+)
+def test_the_first_line_of_a_model_says_what_was_missing(
+    planned: tuple[Path, Dataset, Diagnosis], verdict: str, said: str
+) -> None:
+    _, dataset, diagnosis = planned
+    other = replace(diagnosis, result=replace(diagnosis.result, verdict=verdict))
+    assert model_text(other, dataset).startswith(f"# The simulation {said} (")
+
+
 @pytest.mark.slow
 def test_a_model_with_its_effects_closes_the_gap_that_it_came_from(
     planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
