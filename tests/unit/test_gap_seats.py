@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.gap.effects import library
-from identification.gap.effects.contact_seating import RUBS, STEPS
+from identification.gap.effects.contact_seating import LAWS, RUBS, STEPS
 from identification.gap.model.bench import make_bench
 from tests.explained import explained
 from tests.unit.test_gap_closer import assert_lawful
@@ -48,3 +48,29 @@ def test_what_gives_way_under_more_force_is_no_seat(opens: bool, seats: bool) ->
     noise = 1e-6 * np.random.default_rng(1).standard_normal(len(moved))
     given = replace(data, displacement=springs * data.force + moved + noise, q=None)
     assert (explained(given).verdict == "contact_seating") is seats
+
+
+@pytest.mark.parametrize("share", [0.137, 0.29])
+def test_the_scale_of_an_arms_seat_is_met_between_those_of_the_grid(share: float) -> None:
+    """As a share of the largest force; a good laser would see a tenth of 0.05 mm left."""
+    there, rng = arm_data(), np.random.default_rng(7)
+    force = np.round(there.force / 40.0) * 40.0
+    lever = np.stack([s.lever for s in there.setups])[there.setup]
+    turned = force[:, None] * lever * there.compliance
+    seats = 5e-5 * LAWS["exponential"](force / (share * force.max()))
+    data = replace(
+        there,
+        force=force + rng.normal(0, 0.05, len(force)),
+        displacement=np.sum(lever * turned, axis=1) + seats + rng.normal(0, 1e-6, len(force)),
+        q=turned + rng.normal(0, 1e-5, turned.shape),
+        instruments=replace(there.instruments, force=0.1, displacement=1e-6),
+        temperature=None,
+    )
+    found = explained(data)
+    assert found.verdict == "contact_seating"
+    (only,) = found.fit.parts
+    ((said, scale),) = only.variant.info["laws"]
+    assert said == "exponential"
+    assert scale == pytest.approx(share * force.max(), rel=0.05)
+    depth = found.effects[0].parameters["depth"]
+    assert depth.low <= 1e3 * seats.max() <= depth.high

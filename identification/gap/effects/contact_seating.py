@@ -51,6 +51,7 @@ SEATED = ("exponential", "hyperbolic")
 # Of an arm, whose other directions tell a seat that goes on and on from a curved spring, and a gap
 # that closes on a weak spring from a knee.
 BESIDES = ("logarithmic", "slack")
+SCALED = (*SEATED, "logarithmic")
 GOES_ON = ("logarithmic", "Hertz")  # over all of the load, like a spring
 # How much of the depth is gone at x times the force scale, or at x times the stroke of a slack: of
 # one that is taken up bit by bit the stiffness grows in proportion to the stroke.
@@ -317,14 +318,17 @@ def _given(bench: Bench, force: float) -> float:
     return force * float(np.abs(bench.slope * bench.load).max() / np.abs(bench.load).max())
 
 
-def slack_of(v: Variant) -> str | None:
-    """The kind of slack of which the width has to be met well, None of what is none."""
+def met_closely(v: Variant, *, arm: bool) -> str | None:
+    """The kind of slack of which the width has to be met well, or of an arm's seat of which the
+    scale has to be; None of others."""
     kinds = [law for law, _ in v.info["laws"]]
-    return " ".join(kinds[:2]) if kinds[0] == "slack" or kinds == ["toe"] else None
+    if kinds[0] == "slack" or kinds == ["toe"]:
+        return " ".join(kinds[:2])
+    return kinds[0] if arm and len(kinds) == 1 and kinds[0] in SCALED else None
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
-    """Slacks about one that was found, close: of the steps of a first look."""
+    """Slacks, or seats, about one that was found, close: of the steps of a first look."""
     law, force = found.info["laws"][0]
     wide = force * (1 + close * FINER)
     if not bench.imposed:
@@ -369,9 +373,10 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
 
 
 def _look_closer(word: Word) -> list[Variant]:
-    kinds = {slack_of(s.variant): s for s in reversed(word.alone)}
-    slacks = [s for kind, s in kinds.items() if kind]
-    return closing_in(word, refined, slacks)
+    arm = word.engine.bench.data.arm
+    kinds = {met_closely(s.variant, arm=arm): s for s in reversed(word.beside or word.alone)}
+    kinds |= {met_closely(s.variant, arm=arm): s for s in reversed(word.alone)}
+    return closing_in(word, refined, [s for kind, s in kinds.items() if kind])
 
 
 EFFECT = Effect(
