@@ -13,7 +13,7 @@ from identification.gap.laws.memories import LIKELY, memories
 from identification.gap.laws.specimens import OWN, with_other_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import whiles
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import TAKEN_BACK, Variant
 from identification.gap.recording.turns import way_back
 
 HARDENED = "hardened"  # its knee
@@ -54,7 +54,9 @@ def hardened(
         for k, r in enumerate(radius):
             label = f"{name}{memory} {HARDENED} beyond {r / top:.3g}"
             share = _PRIOR * LIKELY[memory] / len(radius)
-            out.append(_shape(word, label, columns[k:], radius[k:], share, facts))
+            # a clamp that is taken back lets go at one threshold, and is no metal that hardens
+            last = k + _NEIGHBOURS if memory == TAKEN_BACK else len(radius)
+            out.append(_shape(word, label, columns[k:last], radius[k:last], share, facts))
     return out
 
 
@@ -75,7 +77,8 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     place = {key: info[key] for key in info if key not in _OWN}
     out, share = [], _FINE_PRIOR / len(radius) / 2
     for k, r in enumerate(radius[:-1]):
-        for last in dict.fromkeys((k + 2, len(radius))):
+        ends = (k + _NEIGHBOURS, len(radius))
+        for last in dict.fromkeys(ends[: 1 if info["memory"] == TAKEN_BACK else 2]):
             label = f"{found.label.partition(HARDENED)[0]}{HARDENED} beyond {r:.4g} fine"
             out.append(_shape(found.word, label, columns[k:last], radius[k:last], share, place))
     if found.other_springs:
