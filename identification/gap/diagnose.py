@@ -133,12 +133,14 @@ def _without_what_is_gone(
     """The search without those effects of the simulation that are not in the data as it has them,
     and their words: a mechanism was repaired since, or goes on at another load."""
     gone: list[str] = []
-    while (word := in_question(found)) is not None:
+    asked = in_question(found)
+    while asked:
+        word = asked.pop(0)
         kept = [f for f in known if f.word not in (word, *gone)]
         again = _with_unseen(_searched(*_prepared(bench, kept, withheld)), kept, withheld)
-        if not is_gone(found, again):
-            break
-        found, gone = again, [*gone, word]
+        if is_gone(found, again):
+            found, gone = again, [*gone, word]
+            asked = in_question(found)
     return found, tuple(gone)
 
 
@@ -147,8 +149,9 @@ def _with_unseen(
 ) -> SearchResult:
     """The search once more with loads between readings, where these explain more than it costs to
     say which they are, or make foretold what was not."""
+    first = found.explanations[0].log_weight
     found, paid = _by_one_word(found, known, withheld)
-    paid_off = True
+    paid_off = not paid or found.explanations[0].log_weight - first > _PAYS * paid
     for i in range(_ROUNDS):
         foretold = foretells(found)
         if _hopeless(found, foretold, paid_off):

@@ -96,9 +96,9 @@ class Diagnosis:
         known = [f"The simulation has these effects already: {names}."] if names else []
         if gone := " and ".join(self.result.gone):
             known.append(
-                f"The model's {gone} does not do to these data what it did to those that it was "
-                "made from: repaired since, gone on, or under a force that was read otherwise. "
-                "What follows is about the simulation without it."
+                f"Left out of the model: {gone}, which is not in these data as the model has it: "
+                "repaired since, gone on, or under a force that was read otherwise. What follows "
+                "is about the simulation without."
             )
         if self.left_behind:
             known.append(

@@ -192,6 +192,8 @@ def _sized(key: Key, value: Any, at: tuple[str | int, ...]) -> float:
         raise FormError(at, f"{number:g} is not allowed; allowed: 0 or more.")
     if key.kind == "positive" and not number > 0:
         raise FormError(at, f"{number:g} is not allowed; allowed: above 0.")
+    if key.kind == "share" and not 0 <= number <= 1:
+        raise FormError(at, f"{number:g} is not allowed; allowed: 0 to 1.")
     return number / key.factor
 
 

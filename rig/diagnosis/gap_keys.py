@@ -32,9 +32,9 @@ CONTAINED = "contained_in"  # its numbers stand in another key of the model file
 
 @dataclass(frozen=True)
 class Key:
-    """A key of the file: SI value times `factor`; kind: number, positive, size (0 or more), count,
-    text, vector, six (numbers), flag, springs. count: from 1 in the file, from 0 inside; springs:
-    six stiffnesses in the file, six compliances inside."""
+    """A key of the file: SI value times `factor`; kind: number, positive, size (0 or more), share
+    (0 to 1), count, text, vector, six (numbers), flag, springs. count: from 1 in the file, from 0
+    inside; springs: six stiffnesses in the file, six compliances inside."""
 
     name: str
     kind: str = "number"
@@ -48,7 +48,7 @@ CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),
     "memory": _MEMORY,
     "forgets": Key("memory", "text", options=(ANEW,)),
-    joint_creep.STOOD_ON: Key(joint_creep.STOOD_ON, "positive"),
+    joint_creep.STOOD_ON: Key(joint_creep.STOOD_ON, "share"),
     "flow_time": Key("flow_time_s", "size"),
     "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=tuple(base_slip.AXES)),

@@ -51,10 +51,11 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     sure = likely(result.probabilities[result.verdict])
     found = {
         "none": f"in which rig diagnose found nothing missing ({sure})",
-        "unknown": f"as it was given: what is missing in it is unknown ({sure})",
+        "unknown": f"in which something is missing, and what is unknown ({sure})",
     }.get(result.verdict, f"with what rig diagnose found missing in it: {result.verdict} ({sure})")
+    gone = "; left out as it is not in the data: " + " and ".join(result.gone)
     lines = [
-        f"# The simulation {found}.",
+        f"# The simulation {found}{gone if result.gone else ''}.",
         f"# Data set: {dataset.uuid}",
         f"note: {json.dumps(note)}",
         *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *_believed(result)),

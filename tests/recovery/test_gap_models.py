@@ -241,7 +241,7 @@ def test_of_an_unknown_gap_no_spring_is_made(
     ("verdict", "said"),
     [
         ("none", "in which rig diagnose found nothing missing"),
-        ("unknown", "as it was given: what is missing in it is unknown"),
+        ("unknown", "in which something is missing, and what is unknown"),
         ("joint_creep", "with what rig diagnose found missing in it: joint_creep"),
     ],
 )

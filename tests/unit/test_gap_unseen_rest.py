@@ -71,6 +71,17 @@ def test_a_load_stands_on_for_its_share_of_a_rest(stood: float) -> None:
 
 
 @pytest.mark.parametrize("stood", [0.0, 1.0])
+def test_nothing_is_left_where_memory_is_fresh(stood: float) -> None:
+    """Not of the old load that stood on, either."""
+    rows = make_bench(loaded_only(stood, creeps=1.0)).rows
+    again, load = rests(rows), rows.force[:, None]
+    first = np.flatnonzero(again)[1]
+    fresh = np.arange(rows.n) == first
+    z = retarded(load, np.array([T_S]), rows, again, fresh, stood)
+    assert abs(z[first, 0]) < 0.1
+
+
+@pytest.mark.parametrize("stood", [0.0, 1.0])
 def test_creep_is_known_whenever_the_load_was_taken_off(stood: float) -> None:
     found = explained(loaded_only(stood))
     assert found.verdict == "joint_creep"

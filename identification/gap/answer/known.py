@@ -68,13 +68,13 @@ def _misfit(bench: Bench) -> float:
     return float((target @ target - inner @ (white.T @ target)) / 2)
 
 
-def in_question(found: SearchResult) -> str | None:
-    """The word of an effect of the simulation that may not be in the data as it has it: one whose
-    size or loads the best explanation has far off, or beside which that needs the same word once
-    more. None where all are about as the model has them."""
+def in_question(found: SearchResult) -> list[str]:
+    """Words of the simulation's effects that may not be in the data as it has them, the likeliest
+    first: those whose size or loads the best explanation has far off, or beside which it needs the
+    same word once more. None where all are about as the model has them."""
     engine, best = found.engine, found.explanations[0]
     if engine.bench.known is None:
-        return None
+        return []
     base = fit(engine, best).base / engine.base.sd
     off: dict[str, float] = {}
     for name, z in zip(engine.base.names, base, strict=True):
@@ -82,16 +82,17 @@ def in_question(found: SearchResult) -> str | None:
             word = name.split()[-1]
             twice = inf if word in best.words else 0.0
             off[word] = max(off.get(word, 0.0), abs(float(z)), twice)
-    worst = max(off, key=lambda word: off[word])
-    return worst if off[worst] > _OFF else None
+    return sorted((w for w in off if off[w] > _OFF), key=lambda word: -off[word])
 
 
 def is_gone(found: SearchResult, without: SearchResult) -> bool:
     """Whether the same is explained as well, or far better, by a simulation without an effect that
-    is in question: then it is not there as the model has it."""
+    is in question: then it is not there as the model has it. Where a gap that no law explains is
+    likelier without it, nothing is said of it."""
     best, again = found.explanations[0], without.explanations[0]
-    as_well = again.eta <= max(best.eta, _CLOSELY * without.engine.bench.noise.stated)
-    return as_well or again.log_weight > best.log_weight + _GONE
+    as_well = again.eta <= _CLOSELY * without.engine.bench.noise.stated
+    better = again.log_weight > best.log_weight + _GONE
+    return (as_well or better) and again.log_weight > without.unknown
 
 
 _SAID = "known "  # so begin the names of what is not known of the simulation's effects

@@ -374,8 +374,7 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
 
 def _look_closer(word: Word) -> list[Variant]:
     arm = word.engine.bench.data.arm
-    kinds = {met_closely(s.variant, arm=arm): s for s in reversed(word.beside or word.alone)}
-    kinds |= {met_closely(s.variant, arm=arm): s for s in reversed(word.alone)}
+    kinds = {met_closely(s.variant, arm=arm): s for s in reversed(word.alone)}
     return closing_in(word, refined, [s for kind, s in kinds.items() if kind])
 
 

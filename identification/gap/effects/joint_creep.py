@@ -197,7 +197,7 @@ def refined(bench: Bench, found: Variant, _: float = 1.0) -> list[Variant]:
 
 
 def _unloads_unseen(bench: Bench) -> bool:
-    """Whether loads were taken off between two runs, and nobody saw when."""
+    """Whether loads were taken off between two runs: when, no row says."""
     rests = np.flatnonzero(bench.rest[1:]) + 1
     return bool(np.any(np.abs(bench.load[rests - 1]) > _LOADED * np.abs(bench.load).max()))
 

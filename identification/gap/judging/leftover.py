@@ -49,8 +49,8 @@ COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whe
 BUT_A_LAG = 1e4  # nats against a creep that is but a lag: beyond what any data bring
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
-# Times the noise that samples miss where nothing is said to be wrong: faster than rows tell, what
-# swings so is no noise, which their second differences would show.
+# Times the noise that samples of a rig without an arm miss where nothing is said to be wrong: rows
+# average fast swings away, and were these noise, second differences would have told so much of it.
 SWINGS = 2.5
 # What takes any path in time is bound by no law that could be off: as the main cause it leaves
 # hardly anything of what springs leave. Of a stand that slips once, and stays there, it leaves a

@@ -73,6 +73,7 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     if not 0 < knee < top:
         return []
     radius = knee * (1 + close * _FINE)
+    radius = radius[radius < top]
     columns = [info["column"](s) for s in grown(load, radius, memories(bench)[info["memory"]]).T]
     place = {key: info[key] for key in info if key not in _OWN}
     out, share = [], _FINE_PRIOR / len(radius) / 2

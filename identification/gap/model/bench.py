@@ -148,9 +148,8 @@ class Bench:
 
     @cached_property
     def zero_line(self) -> Array:
-        """(n,) N: what the force shows at zero load, straight in between; 0 where it stands still
-        within its noise, or was read but once. A threshold is met by the force less this; springs
-        alone would not mind."""
+        """(n,) N: what the force shows at zero load, as `force_without_load` has it. A threshold is
+        met by the force less this; springs alone would not mind."""
         if self.imposed:
             return np.zeros(self.rows.n)
         tared = self.data.tare == "run"

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, Ints
 from identification.gap.data import GapData
-from identification.gap.recording.digits import in_one_number, left_of, step_of
+from identification.gap.recording.digits import from_first, in_one_number, left_of, step_of
 from identification.gap.recording.holds import ENOUGH, scatter_within
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.white import QUARTILE
@@ -32,9 +32,8 @@ def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
     one, rounded = _one(data, rows, hold), np.zeros((data.joints, len(rows.edges)))
     if data.q is None or rows.q is None or rows.continuous:
         return Readings(one, rounded, 0.0, 0.0)
-    first = np.unique(data.setup, return_index=True)[1]
-    turned = data.q - data.q[first][np.unique(data.setup, return_inverse=True)[1]]
-    common = step_of(turned.ravel())  # a joint that hardly turns shows too few of them
+    turned = from_first(data.q, data.setup)
+    common = step_of(turned.T.ravel())  # a joint that hardly turns shows too few of them
     for j, step in enumerate(common or step_of(q) for q in turned.T):
         one[j] = max(one[j], step / 12**0.5)
         if step > 0 and in_one_number(data.q[:, j], hold):

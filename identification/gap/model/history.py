@@ -175,6 +175,8 @@ def retarded(
     between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten.
     stood: as in `phases_of`."""
     old = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
+    if fresh is not None:
+        old[fresh] = 0.0
     before = np.where(rest[:, None], 0.0, old)
     phases = phases_of(rows, rest, stood)
     # z_i = keep_i z_{i-1} + gain_i: the old load standing on, a rest; a ramp to the new load, then

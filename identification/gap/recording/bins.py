@@ -73,7 +73,8 @@ class Bins:
         var, both = self.mean(x**2) - self.mean(x) ** 2, self.mean(x * u)
         each = (both - self.mean(x) * self.mean(u)) / np.maximum(var, 1e-300)
         slope = np.where(var > 0, each, 0.0)
-        return self._unbiased(np.maximum(square - slope**2 * var, 0.0))
+        about_line = np.maximum(square - slope**2 * var, 0.0)
+        return np.where(var > 0, self._unbiased(about_line), square)
 
     def _unbiased(self, square: Array) -> Array:
         """(k,) mean squares about a row's mean, from those (k,) about a line in it, which takes
@@ -81,7 +82,7 @@ class Bins:
         free = np.maximum(self.count - 2, 0)
         if not free.any():
             return square
-        one = float(self.count @ square / free.sum())
+        one = float((self.count * square)[free > 0].sum() / free.sum())
         few = one * (self.count - 1) / self.count
         return np.where(free > 0, square * (self.count - 1) / np.maximum(free, 1), few)
 

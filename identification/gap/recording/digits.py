@@ -16,7 +16,7 @@ from identification.gap.data import GapData
 from identification.gap.recording.holds import ENOUGH
 
 _ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
-_FEWEST = 6  # values that tell a lattice
+_FEWEST = 6  # values that tell a lattice, and readings that come again
 _MULTIPLE = 0.05  # of a step by which a value may be off the lattice: conversions round, too
 _SAME = 1e-9  # of the range: digits that a conversion of units leaves
 
@@ -54,10 +54,16 @@ def left_of(means: Array, setup: Ints, step: float) -> Array:
 def digit_of(data: GapData, channel: str) -> float:
     """Step (N, m) in which a channel is read; 0 where none shows, or where it may be what was set
     rather than read."""
-    values = getattr(data, channel)
+    values = from_first(getattr(data, channel), data.run)
     step = step_of(values)
     drives = channel == ("displacement" if data.imposed == "displacement" else "force")
     return 0.0 if drives and _may_be_set(values, step) else step
+
+
+def from_first(values: Array, group: Ints) -> Array:
+    """Values (n, ...) less the first one of their group: what a run was zeroed by is no digit."""
+    _, first, which = np.unique(group, return_index=True, return_inverse=True)
+    return np.asarray(values - values[first][which])
 
 
 def _may_be_set(values: Array, step: float) -> bool:
@@ -67,21 +73,20 @@ def _may_be_set(values: Array, step: float) -> bool:
         return True
     leading = step / 10 ** np.floor(np.log10(step * (1 + _SAME)))
     is_round = min(abs(leading - d) for d in (1, 2, 5)) < _SAME
-    return is_round and len(np.unique(values)) <= _MANY
+    return is_round and len(_each(values)) <= _MANY
 
 
 _LARGE = 0.02  # of the range
 
 
 def step_of(values: Array) -> float:
-    """Step of the lattice on which all values (n,) lie; 0 where they lie on none. Where it is at
-    every place of that, a converter reads one again and again, and a ramp does not; a few places
-    are levels, and what answered to these: of them the decimals tell."""
-    span = float(np.ptp(values))
-    steps = np.diff(np.unique(values))
-    steps = steps[steps > _SAME * span]
-    if len(steps) < _FEWEST - 1:
+    """Step of the lattice on which all values (n,) lie, to which some come again; 0 where they lie
+    on none. Where they are at every place of it, a converter reads one again and again, and a ramp
+    does not; a few places are levels, and what answered to these: of them the decimals tell."""
+    each = _each(values)
+    if not _FEWEST <= len(each) <= len(values) - _FEWEST:
         return 0.0
+    steps = np.diff(each)
     places = steps / steps.min()
     if np.any(np.abs(places - np.round(places)) > _MULTIPLE):
         return 0.0
@@ -93,7 +98,13 @@ def step_of(values: Array) -> float:
     return step if len(steps) > _MANY else _decimal(values, step)
 
 
-_MANY, _EVENLY = 50, 1.5  # steps that are no levels; of the least of them
+def _each(values: Array) -> Array:
+    """Values (n,) each once, but for what a conversion of units leaves."""
+    least = _SAME * float(np.ptp(values)) or 1.0
+    return np.asarray(np.unique(np.round((values - values[0]) / least)) * least)
+
+
+_MANY, _EVENLY = 50, 1.5  # places that are no levels; of the least step
 _AGAIN = 0.1  # of the readings
 
 

@@ -115,7 +115,8 @@ def _looked_for(engine: Engine) -> Ints:
     if rows.continuous or engine.bench.imposed:
         return np.zeros(0, dtype=int)
     at = brought_to(rows)
-    return at[: len(at) * (len(at) >= _FEWEST and len(at) * rows.n <= _MOST)]
+    able = len(at) >= _FEWEST and len(at) * rows.n <= _MOST
+    return at if able else at[:0]
 
 
 def _unlike(each: Iterable[tuple[Explanation, Paths]]) -> Iterator[tuple[Explanation, Paths]]:
