@@ -1,0 +1,76 @@
+"""Loads that no row shows, as one word alone asks for them: several wrong laws together miss less
+along the straight path than the right one does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap import diagnose
+from identification.gap.data import GapData
+from identification.gap.model.bench import make_bench
+from identification.gap.search.unseen import by_one_word
+from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
+
+SLIPS_NM, SHARE = 6.0, 0.4
+GOES_BEYOND_N = 12.0
+
+
+def rubbed(often: float, seed: int = 3) -> tuple[GapData, int]:
+    """Joint 1 sticks by a share of its compliance until it slips; a hand goes beyond so many of the
+    levels, whichever way it comes to them, and back before they are read. How many of these the joint
+    feels."""
+    there, rng = arm_data(), np.random.default_rng(seed)
+    force = np.round(there.force / 40.0) * 40.0
+    turned, count = np.zeros((len(force), 6)), 0
+    for run in np.unique(there.run):
+        mine = np.flatnonzero(there.run == run)
+        lever = there.setups[there.setup[mine[0]]].lever
+        state = before = 0.0
+        for i in mine:
+            way = [force[i]]
+            if force[i] != before and force[i] > 0 and rng.random() < often:
+                way.insert(0, force[i] + GOES_BEYOND_N * np.sign(force[i] - before))
+                count += abs(lever[0]) * GOES_BEYOND_N > SLIPS_NM / 2
+            for f in way:
+                torque = f * lever[0]
+                state = min(max(state, torque - SLIPS_NM), torque + SLIPS_NM)
+            before = force[i]
+            turned[i] = there.compliance * force[i] * lever
+            turned[i, 0] += SHARE * there.compliance[0] * (state - force[i] * lever[0])
+    lever = np.stack([s.lever for s in there.setups])[there.setup]
+    data = replace(
+        there,
+        force=force + rng.normal(0, 0.05, len(force)),
+        displacement=np.sum(lever * turned, axis=1) + rng.normal(0, 2e-6, len(force)),
+        q=turned + rng.normal(0, 1e-5, turned.shape),
+        instruments=replace(there.instruments, force=0.1, displacement=2e-6),
+        temperature=None,
+    )
+    return data, count
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_friction_under_a_hand_is_friction(seed: int) -> None:
+    data, _ = rubbed(0.3, seed)
+    found = explained(data)
+    assert found.verdict == "joint_hysteresis"
+    assert found.after < 1.4 * found.noise
+
+
+def test_the_word_that_is_right_asks_for_the_loads_that_there_were() -> None:
+    data, count = rubbed(0.3)
+    searched = diagnose._searched(*diagnose._prepared(make_bench(data), (), ()))
+    asked = {next(iter(more.words)): more for more in by_one_word(searched)}
+    assert abs(asked["joint_hysteresis"].count - count) <= 0.4 * count
+
+
+def test_nobody_asks_where_the_hand_was_calm() -> None:
+    data, _ = rubbed(0.0)
+    searched = diagnose._searched(*diagnose._prepared(make_bench(data), (), ()))
+    assert list(by_one_word(searched)) == []
+    far = replace(searched, explanations=searched.explanations[1:])
+    assert list(by_one_word(far)) == []
