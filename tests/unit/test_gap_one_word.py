@@ -21,8 +21,8 @@ GOES_BEYOND_N = 12.0
 
 def rubbed(often: float, seed: int = 3) -> tuple[GapData, int]:
     """Joint 1 sticks by a share of its compliance until it slips; a hand goes beyond so many of the
-    levels, whichever way it comes to them, and back before they are read. How many of these the joint
-    feels."""
+    levels, whichever way it comes to them, and back before they are read. How many of these the
+    joint feels."""
     there, rng = arm_data(), np.random.default_rng(seed)
     force = np.round(there.force / 40.0) * 40.0
     turned, count = np.zeros((len(force), 6)), 0

@@ -78,8 +78,8 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     place = {key: info[key] for key in info if key not in _OWN}
     out, share = [], _FINE_PRIOR / len(radius) / 2
     for k, r in enumerate(radius[:-1]):
-        ends = (k + _NEIGHBOURS, len(radius))
-        for last in dict.fromkeys(ends[: 1 if info["memory"] == TAKEN_BACK else 2]):
+        on = k + _ROUND if info["memory"] == TAKEN_BACK else len(radius)
+        for last in dict.fromkeys((k + _NEIGHBOURS, on)):
             label = f"{found.label.partition(HARDENED)[0]}{HARDENED} beyond {r:.4g} fine"
             out.append(_shape(found.word, label, columns[k:last], radius[k:last], share, place))
     if found.other_springs:
@@ -87,7 +87,7 @@ def refined(bench: Bench, found: Variant, w: Array, close: float = 1.0) -> list[
     return out
 
 
-_NEIGHBOURS = 2
+_NEIGHBOURS, _ROUND = 2, 4  # radii of a sharp knee between two, and of a rounded one
 # facts of a shape rather than of its place
 _OWN = ("radius", "centre", "flow_s", "back", "knee", "other_springs")
 
