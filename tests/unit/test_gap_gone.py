@@ -16,6 +16,7 @@ from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
 from identification.gap.diagnose import explain_gap
 from rig.diagnosis.diagnose import Diagnosis
+from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 
 LASER_M, ENCODER_RAD = 2e-6, 1e-5
@@ -136,7 +137,7 @@ def test_it_is_gone_where_all_is_explained_as_well_without_or_far_better(
     assert is_gone(with_it, without) is gone  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", slow_ones((1, 2, 3), (2, 3)))
 def test_what_is_unknown_beside_it_takes_nothing_from_the_model(seed: int) -> None:
     """Every level of every run is off by its own tenth of a millimetre."""
     data = arm()

@@ -15,6 +15,7 @@ from identification.gap.laws.memories import memories
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import SET_UP_ANEW, TAKEN_BACK
 from tests.explained import explained
+from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 
 THRESHOLD_NM, ADDED = 43.0, 1.5
@@ -49,7 +50,7 @@ def gives_way(memory: str) -> GapData:
     )
 
 
-@pytest.mark.parametrize("memory", ["", SET_UP_ANEW, TAKEN_BACK])
+@pytest.mark.parametrize("memory", slow_ones(("", SET_UP_ANEW, TAKEN_BACK), ("",)))
 def test_it_is_a_yield_and_its_threshold_is_found(memory: str) -> None:
     """The torque goes to 123 Nm, and flows back by no law of kinematic hardening."""
     found = explained(gives_way(memory))

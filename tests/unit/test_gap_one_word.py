@@ -13,6 +13,7 @@ from identification.gap.data import GapData
 from identification.gap.model.bench import make_bench
 from identification.gap.search.unseen import by_one_word
 from tests.explained import explained
+from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 
 SLIPS_NM, SHARE = 6.0, 0.4
@@ -53,7 +54,7 @@ def rubbed(often: float, seed: int = 3) -> tuple[GapData, int]:
     return data, count
 
 
-@pytest.mark.parametrize("seed", [3, 4, 5])
+@pytest.mark.parametrize("seed", slow_ones((3, 4, 5), (4, 5)))
 def test_friction_under_a_hand_is_friction(seed: int) -> None:
     data, _ = rubbed(0.3, seed)
     found = explained(data)

@@ -21,6 +21,7 @@ UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
 _LEFT = 0.2  # of the largest response: as much as friction seldom holds
 _FINE = np.linspace(-0.16, 0.2, 13)  # radii of a closer look, from that of the knee on
 _PRIOR, _FINE_PRIOR = 0.7, 0.25
+_EVERY = 2  # radius begins a shape of what is lost sooner: between them it is looked at closely
 
 
 def hardened(
@@ -51,9 +52,10 @@ def hardened(
     for memory, fresh in memories(bench).items():
         columns = [column(s) for s in grown(load, radius, fresh).T]
         facts = {**info, "memory": memory, "load": load, "column": column}
-        for k, r in enumerate(radius):
-            label = f"{name}{memory} {HARDENED} beyond {r / top:.3g}"
-            share = _PRIOR * LIKELY[memory] / len(radius)
+        places = range(0, len(radius), _EVERY if memory else 1)
+        for k in places:
+            label = f"{name}{memory} {HARDENED} beyond {radius[k] / top:.3g}"
+            share = _PRIOR * LIKELY[memory] / len(places)
             # a clamp that is taken back lets go at one threshold, and is no metal that hardens
             last = k + _NEIGHBOURS if memory == TAKEN_BACK else len(radius)
             out.append(_shape(word, label, columns[k:last], radius[k:last], share, facts))
