@@ -114,7 +114,7 @@ KINDS: dict[str, Added] = {
 }
 
 
-@pytest.mark.parametrize("kind", slow_ones(KINDS, ("jumps", "swings")))
+@pytest.mark.parametrize("kind", slow_ones(KINDS, ("jumps", "rough", "swings")))
 def test_what_no_word_names_is_unknown_and_told(kind: str) -> None:
     result = explained(measured(KINDS[kind]))
     assert result.verdict == "unknown"

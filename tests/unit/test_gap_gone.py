@@ -76,7 +76,7 @@ def test_what_is_as_the_model_has_it_is_no_gap() -> None:
     assert "has these effects already: joint_yield" in said(result)
 
 
-@pytest.mark.parametrize("added", [0.0, 0.5 * ADDED, 1.6 * ADDED])
+@pytest.mark.parametrize("added", slow_ones((0.0, 0.5 * ADDED, 1.6 * ADDED), (1.6 * ADDED,)))
 def test_what_was_repaired_or_got_worse_is_found_anew(added: float) -> None:
     """What the model has of it would pass for a law that is known to a tenth."""
     result = second_day(arm(added=added))
@@ -102,7 +102,7 @@ def test_a_drift_beside_it_leaves_it_where_it_is() -> None:
     assert (result.verdict, result.gone) == ("force_drift", ())
 
 
-@pytest.mark.parametrize("drift_N", [0.0, 8.0])
+@pytest.mark.parametrize("drift_N", slow_ones((0.0, 8.0), (0.0,)))
 def test_thresholds_are_met_by_the_true_force(drift_N: float) -> None:
     """Not by what an amplifier reads that has drifted."""
     data = arm(drift_N=drift_N)
@@ -137,7 +137,8 @@ def test_it_is_gone_where_all_is_explained_as_well_without_or_far_better(
     assert is_gone(with_it, without) is gone  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("seed", slow_ones((1, 2, 3), (2, 3)))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_is_unknown_beside_it_takes_nothing_from_the_model(seed: int) -> None:
     """Every level of every run is off by its own tenth of a millimetre."""
     data = arm()

@@ -50,7 +50,7 @@ def gives_way(memory: str) -> GapData:
     )
 
 
-@pytest.mark.parametrize("memory", slow_ones(("", SET_UP_ANEW, TAKEN_BACK), ("",)))
+@pytest.mark.parametrize("memory", slow_ones(("", SET_UP_ANEW, TAKEN_BACK), ("", SET_UP_ANEW)))
 def test_it_is_a_yield_and_its_threshold_is_found(memory: str) -> None:
     """The torque goes to 123 Nm, and flows back by no law of kinematic hardening."""
     found = explained(gives_way(memory))

@@ -12,6 +12,7 @@ from identification.gap.data import GapData
 from identification.gap.effects import contact_seating, library
 from identification.gap.model.bench import Bench, make_bench
 from tests.explained import explained
+from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_running import running, triangle
 
@@ -39,7 +40,7 @@ def steps(data: GapData) -> tuple[Array, Array]:
     return change[hold], first
 
 
-@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("late", slow_ones((False, True), (True,)))
 def test_what_is_ahead_of_the_load_does_not_lag(late: bool) -> None:
     """The first reading of every hold: a tenth of the step too far, as a hand leaves it, or too
     little."""

@@ -62,6 +62,7 @@ def test_friction_under_a_hand_is_friction(seed: int) -> None:
     assert found.after < 1.4 * found.noise
 
 
+@pytest.mark.slow
 def test_the_word_that_is_right_asks_for_the_loads_that_there_were() -> None:
     data, count = rubbed(0.3)
     searched = diagnose._searched(*diagnose._prepared(make_bench(data), (), ()))

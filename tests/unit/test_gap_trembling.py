@@ -65,6 +65,7 @@ def test_noise_of_the_force_is_no_lag(seed: int) -> None:
     assert not any("scatter" in n for n in quiet.notes)
 
 
+@pytest.mark.slow
 def test_where_readings_scatter_far_more_than_stated_no_gap_is_said_to_be_there() -> None:
     data = stepped(5, 0.1)
     noise = np.random.default_rng(5).normal(0, 9 * LASER_M, len(data.force))

@@ -14,6 +14,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import NOMINAL
 from identification.gap.model.bench import make_bench
 from tests.explained import explained
+from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_parameters import no_spread, of
@@ -48,7 +49,7 @@ def rubbing(step_N: float) -> GapData:
     return replace(data, step=step, compliance=np.array([1 / SPRING]), instruments=meter)
 
 
-@pytest.mark.parametrize(("step_N", "widest"), [(20.0, 0.6), (4.0, 0.3)])
+@pytest.mark.parametrize(("step_N", "widest"), slow_ones(((20.0, 0.6), (4.0, 0.3)), (4.0,)))
 def test_how_far_friction_gives_way_is_known_as_far_as_readings_show_it(
     step_N: float, widest: float
 ) -> None:
