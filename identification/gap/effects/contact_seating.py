@@ -373,7 +373,8 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
 
 
 def _look_closer(word: Word) -> list[Variant]:
-    arm = word.engine.bench.data.arm
+    bench = word.engine.bench
+    arm = bench.data.arm and not bench.imposed  # of an imposed stroke only slacks are told
     kinds = {met_closely(s.variant, arm=arm): s for s in reversed(word.alone)}
     return closing_in(word, refined, [s for kind, s in kinds.items() if kind])
 
