@@ -12,6 +12,7 @@ from identification.gap.model.bench import make_bench
 from identification.gap.recording.digits import as_fine_as_digits, step_of
 from rig.diagnosis.diagnose_text import render
 from tests.explained import explained
+from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
@@ -120,18 +121,10 @@ def test_a_curve_beyond_its_digits_is_still_seen() -> None:
 def linear_arm(step_rad: float, scatter_rad: float = 0.0) -> GapData:
     """As simulated; joints are read in steps, from places of their own within one."""
     there, rng = arm_data(), np.random.default_rng(7)
-    force = np.round(there.force / 40.0) * 40.0
-    lever = np.stack([s.lever for s in there.setups])[there.setup]
+    force, lever = levels_of(there)
     turned = force[:, None] * lever * there.compliance
     read = turned + rng.uniform(-0.5, 0.5, 6) * step_rad + rng.normal(0, scatter_rad, turned.shape)
-    return replace(
-        there,
-        force=force + rng.normal(0, 0.05, len(force)),
-        displacement=np.sum(lever * turned, axis=1) + rng.normal(0, 2e-6, len(force)),
-        q=step_rad * np.round(read / step_rad),
-        instruments=replace(there.instruments, force=0.1, displacement=2e-6),
-        temperature=None,
-    )
+    return replace(as_read(there, force, turned, rng), q=step_rad * np.round(read / step_rad))
 
 
 @pytest.mark.parametrize("scatter_rad", [0.0, 2e-6, 1e-4])

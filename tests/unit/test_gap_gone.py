@@ -17,9 +17,9 @@ from identification.gap.data import GapData
 from identification.gap.diagnose import explain_gap
 from rig.diagnosis.diagnose import Diagnosis
 from tests.slow import slow_ones
+from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_forms import arm_data
 
-LASER_M, ENCODER_RAD = 2e-6, 1e-5
 ADDED = 1.5  # times the joint's compliance, beyond the threshold
 
 
@@ -27,7 +27,7 @@ def arm(threshold_Nm: float = 60.0, added: float = ADDED, drift_N: float = 0.0) 
     """Joint 1 gives way beyond its threshold, and goes back between two runs; x and y in two poses,
     twice up and down. The reading of the force may drift over the session."""
     there, rng = arm_data(), np.random.default_rng(7)
-    force = np.round(there.force / 40.0) * 40.0
+    force, _ = levels_of(there)
     turned = np.zeros((len(force), 6))
     for run in np.unique(there.run):
         mine = there.run == run
@@ -36,19 +36,9 @@ def arm(threshold_Nm: float = 60.0, added: float = ADDED, drift_N: float = 0.0) 
         turned[mine] = torque * there.compliance
         beyond = np.maximum.accumulate(np.maximum(np.abs(torque[:, 0]) - threshold_Nm, 0.0))
         turned[mine, 0] += added * there.compliance[0] * beyond * np.sign(lever[0])
-    lever = np.stack([s.lever for s in there.setups])[there.setup]
-    moved = np.sum(lever * turned, axis=1)
     assert there.session is not None
     drift = drift_N * there.session / there.session.max()
-    meter = replace(there.instruments, force=0.1, displacement=LASER_M)
-    return replace(
-        there,
-        force=force + drift + rng.normal(0, 0.05, len(force)),
-        displacement=moved + rng.normal(0, LASER_M, len(force)),
-        q=turned + rng.normal(0, ENCODER_RAD, turned.shape),
-        instruments=meter,
-        temperature=None,
-    )
+    return as_read(there, force + drift, turned, rng)
 
 
 @cache

@@ -3,8 +3,6 @@ when they are unloaded from more than twice their threshold."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -16,6 +14,7 @@ from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import SET_UP_ANEW, TAKEN_BACK
 from tests.explained import explained
 from tests.slow import slow_ones
+from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_forms import arm_data
 
 THRESHOLD_NM, ADDED = 43.0, 1.5
@@ -25,14 +24,13 @@ def gives_way(memory: str) -> GapData:
     """Joint 1, by 1.5 times its compliance; it is as it was at the beginning of every run, in
     another direction, or in another pose only."""
     there, rng = arm_data(), np.random.default_rng(7)
-    force = np.round(there.force / 40.0) * 40.0
+    force, lever = levels_of(there)
     setup = np.array([[s.pose, s.direction] for s in there.setups])[there.setup]
     kept = {
         TAKEN_BACK: np.char.add(np.char.add(*setup.T), there.run.astype(str)),
         SET_UP_ANEW: np.char.add(*setup.T),
         "": setup[:, 0],
     }[memory]
-    lever = np.stack([s.lever for s in there.setups])[there.setup]
     torque = force[:, None] * lever
     turned = torque * there.compliance
     for one in np.unique(kept):
@@ -40,14 +38,7 @@ def gives_way(memory: str) -> GapData:
         most = np.maximum.accumulate(np.maximum(np.abs(torque[mine, 0]) - THRESHOLD_NM, 0.0))
         way = np.cumsum(np.sign(torque[mine, 0]) * np.diff(most, prepend=0.0))
         turned[mine, 0] += ADDED * there.compliance[0] * way
-    return replace(
-        there,
-        force=force + rng.normal(0, 0.05, len(force)),
-        displacement=np.sum(lever * turned, axis=1) + rng.normal(0, 2e-6, len(force)),
-        q=turned + rng.normal(0, 1e-5, turned.shape),
-        instruments=replace(there.instruments, force=0.1, displacement=2e-6),
-        temperature=None,
-    )
+    return as_read(there, force, turned, rng)
 
 
 @pytest.mark.parametrize("memory", slow_ones(("", SET_UP_ANEW, TAKEN_BACK), ("", SET_UP_ANEW)))

@@ -14,6 +14,7 @@ from identification.gap.model.bench import make_bench
 from identification.gap.search.unseen import by_one_word
 from tests.explained import explained
 from tests.slow import slow_ones
+from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_forms import arm_data
 
 SLIPS_NM, SHARE = 6.0, 0.4
@@ -25,7 +26,7 @@ def rubbed(often: float, seed: int = 3) -> tuple[GapData, int]:
     levels, whichever way it comes to them, and back before they are read. How many of these the
     joint feels."""
     there, rng = arm_data(), np.random.default_rng(seed)
-    force = np.round(there.force / 40.0) * 40.0
+    force, _ = levels_of(there)
     turned, count = np.zeros((len(force), 6)), 0
     for run in np.unique(there.run):
         mine = np.flatnonzero(there.run == run)
@@ -42,16 +43,7 @@ def rubbed(often: float, seed: int = 3) -> tuple[GapData, int]:
             before = force[i]
             turned[i] = there.compliance * force[i] * lever
             turned[i, 0] += SHARE * there.compliance[0] * (state - force[i] * lever[0])
-    lever = np.stack([s.lever for s in there.setups])[there.setup]
-    data = replace(
-        there,
-        force=force + rng.normal(0, 0.05, len(force)),
-        displacement=np.sum(lever * turned, axis=1) + rng.normal(0, 2e-6, len(force)),
-        q=turned + rng.normal(0, 1e-5, turned.shape),
-        instruments=replace(there.instruments, force=0.1, displacement=2e-6),
-        temperature=None,
-    )
-    return data, count
+    return as_read(there, force, turned, rng), count
 
 
 @pytest.mark.parametrize("seed", slow_ones((3, 4, 5), (4, 5)))

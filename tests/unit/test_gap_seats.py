@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Literal
 
 import numpy as np
 import pytest
 
-from identification.gap.effects import library
+from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import LAWS, RUBS, STEPS
 from identification.gap.model.bench import make_bench
 from tests.explained import explained
+from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_model import survive
@@ -54,19 +57,10 @@ def test_what_gives_way_under_more_force_is_no_seat(opens: bool, seats: bool) ->
 def test_the_scale_of_an_arms_seat_is_met_between_those_of_the_grid(share: float) -> None:
     """As a share of the largest force; a good laser would see a tenth of 0.05 mm left."""
     there, rng = arm_data(), np.random.default_rng(7)
-    force = np.round(there.force / 40.0) * 40.0
-    lever = np.stack([s.lever for s in there.setups])[there.setup]
+    force, lever = levels_of(there)
     turned = force[:, None] * lever * there.compliance
     seats = 5e-5 * LAWS["exponential"](force / (share * force.max()))
-    data = replace(
-        there,
-        force=force + rng.normal(0, 0.05, len(force)),
-        displacement=np.sum(lever * turned, axis=1) + seats + rng.normal(0, 1e-6, len(force)),
-        q=turned + rng.normal(0, 1e-5, turned.shape),
-        instruments=replace(there.instruments, force=0.1, displacement=1e-6),
-        temperature=None,
-    )
-    found = explained(data)
+    found = explained(as_read(there, force, turned, rng, beside=seats, laser_m=1e-6))
     assert found.verdict == "contact_seating"
     (only,) = found.fit.parts
     ((said, scale),) = only.variant.info["laws"]
@@ -74,3 +68,21 @@ def test_the_scale_of_an_arms_seat_is_met_between_those_of_the_grid(share: float
     assert scale == pytest.approx(share * force.max(), rel=0.05)
     depth = found.effects[0].parameters["depth"]
     assert depth.low <= 1e3 * seats.max() <= depth.high
+
+
+@pytest.mark.parametrize("imposed", [None, "displacement"])
+def test_only_slacks_of_an_imposed_stroke_are_looked_at_more_closely(
+    monkeypatch: pytest.MonkeyPatch, imposed: Literal["displacement"] | None
+) -> None:
+    """A stroke tells of no other seat, on an arm as little as elsewhere."""
+    data = arm_data()
+    step = data.step if imposed is None else data.step - 99
+    bench = make_bench(replace(data, imposed=imposed, step=step))
+    seats = [SimpleNamespace(variant=v) for v in library(bench, ["contact_seating"])]
+    starts: list[SimpleNamespace] = []
+    monkeypatch.setattr(contact_seating, "closing_in", lambda _, __, these: starts.extend(these))
+    word = SimpleNamespace(engine=SimpleNamespace(bench=bench), alone=seats)
+    contact_seating._look_closer(word)  # type: ignore[arg-type]
+    laws = {s.variant.info["laws"][0][0] for s in starts}
+    assert bench.imposed is (imposed is not None)
+    assert (laws <= {"slack", "toe"}) is bench.imposed

@@ -72,11 +72,13 @@ def closing_in(
     refined: Callable[..., list[Variant]],
     starts: list[Scored],
     closer: tuple[float, ...] = (_CLOSE,),
+    *,
+    to_the_last: bool = False,
 ) -> list[Variant]:
     """Finer shapes about those that were found, and finer ones still about the best of these. What
     is best moves along narrow valleys (a zone is as wide as the crossing is far): every look but
     the closest is moved after it until it stays, and the last one is kept. What was seen to be far
-    worse is left out."""
+    worse is left out; the last look is scored for this only if asked `to_the_last`."""
     engine = word.engine
     fresh = [v for s in starts for v in refined(engine.bench, s.variant)]
     finer, found = list(fresh), list[Scored]()
@@ -89,11 +91,8 @@ def closing_in(
                 break
             fresh = refined(engine.bench, best, share)
         finer += fresh
-    return near(finer, found)
-
-
-def near(finer: list[Variant], found: list[Scored]) -> list[Variant]:
-    """Those that were not found to be far worse than the best of what was found."""
+    if to_the_last:
+        found += scored_beside(engine, word.families, word.ranked, fresh)
     best_of = max(map(evidence, found), default=0.0)
     far = {s.variant for s in found if s.log_evidence < best_of - _FAR}
     return [v for v in finer if v not in far]

@@ -16,7 +16,6 @@ from identification.gap.laws.closer import (
     closing_in,
     estimate,
     evidence,
-    near,
     places,
     scored_beside,
     shows,
@@ -56,8 +55,7 @@ def finer(word: Word, between: Between | None = None) -> list[Variant]:
     closer = closing_in(word, refined, best, CLOSE)
     flat = [v for s in best for v in plateaus(word.engine.bench, s.variant)]
     firm = places(word.alone, word.beside, lambda v: bool(v.info["knee"] == HARDENED))
-    lasts = closing_in(word, partial(_hardened, word), firm, CLOSE)
-    lasts = near(lasts, scored_beside(word.engine, word.families, word.ranked, lasts))
+    lasts = closing_in(word, partial(_hardened, word), firm, CLOSE, to_the_last=True)
     return closer + flat + lasts + _elsewhere(word, closer, between)
 
 

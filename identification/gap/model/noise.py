@@ -76,7 +76,8 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
     of_force = meter.force / np.sqrt(rows.hold_weight)
-    if (step := digit_of(data, "force")) > 0 and in_one_number(data.force, hold):
+    step = 0.0 if rows.continuous else digit_of(data, "force")
+    if step > 0 and in_one_number(data.force, hold):
         means = rows.hold_means(rows.measured_force)
         of_force = np.maximum(of_force, left_of(means, rows.setup[rows.edges], step)[rows.hold])
     common = np.where(rows.steady, steep * of_force, 0.0)
