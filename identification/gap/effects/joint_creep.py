@@ -24,7 +24,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.evidence.compare import closest
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.closer import Word, closing_in, estimate, places, shows
+from identification.gap.laws.closer import Word, closing_in, estimates, places, shows
 from identification.gap.laws.curves import BENT_SLOPE
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, factors
@@ -219,7 +219,8 @@ def _look_closer(word: Word) -> list[Variant]:
     first = closest(word.families[word.ranked[0]])
     beside = () if first.variant.word == WORD else (Part(first.variant, first.scale),)
     closer = closing_in(word, refined, best)
-    return [v for v in closer if _grows(estimate(word.engine, v, beside).coefficients)]
+    found = estimates(word.engine, closer, beside)
+    return [v for v, e in zip(closer, found, strict=True) if _grows(e.coefficients)]
 
 
 def _grows(coefficients: Array) -> bool:

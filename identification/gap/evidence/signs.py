@@ -44,10 +44,10 @@ class Limits:
         floor = np.zeros(rows.shape[:2])
         asked = np.zeros(rows.shape[:2], dtype=bool)
         for i, v in enumerate(variants):
-            own, alone = len(v.columns), np.flatnonzero(v.each)
+            own, alone = len(v.columns), [k for k, each in enumerate(v.each) if each]
             if v.positive is not None:
                 rows[i, 0, :own], floor[i, 0], asked[i, 0] = v.positive, v.least, True
-            rows[i, 1 + np.arange(len(alone)), alone] = 1.0
+            rows[i, range(1, 1 + len(alone)), alone] = 1.0
             sums = slice(1 + len(alone), 1 + len(alone) + len(v.within))
             if len(v.within):
                 rows[i, sums, :own], floor[i, sums] = v.within, v.floor

@@ -65,7 +65,8 @@ class EvidenceTable:
         self.scales = padded([s.scales for s in stacks])
         self._limits = Limits.joined([s.limits for s in stacks])
         self._plain = np.concatenate([s.plain for s in stacks])
-        self._edges = np.cumsum([0, *(len(s.columns) for s in stacks)]).tolist()
+        self._sizes = [len(s.columns) for s in stacks]
+        self._edges = np.cumsum([0, *self._sizes]).tolist()
         v, k = self._columns.shape
         size = len(levels), v, self.scales.shape[1]
         self.logs, self._best = np.full(size, -np.inf), np.full(v, -np.inf)
@@ -99,7 +100,7 @@ class EvidenceTable:
     def _of_word(self) -> Array:
         """(v,) the best of each one's word."""
         best = np.maximum.reduceat(self._best, self._edges[:-1])
-        return np.repeat(best, np.diff(self._edges))
+        return np.repeat(best, self._sizes)
 
     def limit(self) -> None:
         """Takes away what the limits cost that physics sets, where it counts among the shapes of

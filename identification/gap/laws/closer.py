@@ -126,9 +126,21 @@ class Estimate(NamedTuple):
 def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) -> Estimate:
     """What is most probable with a variant whose columns the engine may not know yet, beside other
     parts."""
+    return estimates(engine, [variant], beside)[0]
+
+
+def estimates(
+    engine: Engine, variants: list[Variant], beside: tuple[Part, ...] = ()
+) -> list[Estimate]:
+    """The same of several variants, each for itself."""
     levels, energy = conditioned(engine, beside)
-    best = score(engine, levels, [variant], energy)[0]
-    eta, parts = engine.levels[best.level].eta, (Part(variant, best.scale), *beside)
+    scored = score(engine, levels, variants, energy)
+    return [_estimate(engine, s, beside) for s in scored]
+
+
+def _estimate(engine: Engine, found: Scored, beside: tuple[Part, ...]) -> Estimate:
+    eta = engine.levels[found.level].eta
+    parts = (Part(found.variant, found.scale), *beside)
     fitted = fit(engine, Explanation(parts, 0.0, eta, (0.0,), 0.0))
     softer = engine.base.softer(fitted.base, engine.bench.data.joints)
     return Estimate(fitted.of(0)[0], softer, float(eta))

@@ -138,9 +138,12 @@ def less_rub(k: int) -> Array:
 def within_play(k: int) -> Array:
     """(m, k) of the coefficients: a play of that zone rubs as much too much at most as too little;
     free places, from the third on, are no further off than half of the play, to either side."""
-    rows = [np.eye(k)[0] + np.eye(k)[1] / MOST_RUB]
-    rows += [np.eye(k)[0] + side * np.eye(k)[i] for i in range(2, k) for side in (2.0, -2.0)]
-    return np.array(rows)
+    free = np.eye(k)[2:]
+    out = np.zeros((1 + 2 * len(free), k))
+    out[:, 0], out[0, 1] = 1.0, 1.0 / MOST_RUB
+    out[1::2] += 2.0 * free
+    out[2::2] -= 2.0 * free
+    return out
 
 
 def crosses(net: Array, torque: Array) -> bool:

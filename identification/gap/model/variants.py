@@ -226,11 +226,14 @@ def variant(
         least,
         _all(each, k),
         np.zeros((0, k)) if within is None else within,
-        np.broadcast_to(floor, 0 if within is None else len(within)),
+        _NO_FLOOR if within is None else np.broadcast_to(floor, len(within)),
         info,
         prior,
         cost,
     )
+
+
+_NO_FLOOR = np.zeros(0)  # nearly all have none, of 5000 variants
 
 
 def _all(each: bool | tuple[bool, ...], k: int) -> tuple[bool, ...]:
