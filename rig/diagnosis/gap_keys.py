@@ -9,7 +9,7 @@ from typing import Any
 from identification.gap.effects import base_slip, contact_seating, joint_creep, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.laws import lost_motion
-from identification.gap.laws.friction_law import FRICTION_LAWS, SLIP_AT_A_STRENGTH
+from identification.gap.laws.friction_law import FRICTION_LAWS, GROWS, SLIP_AT_A_STRENGTH
 from identification.gap.laws.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
 from rig.units import MM_PER_M
 
@@ -90,6 +90,7 @@ SHAPES: dict[str, Key] = {
     "slackens": Key("slackens_beyond_Nm", "positive"),
     "reach": Key("reach_Nm", "positive"),
     "grows_to": Key("grows_with_net_torque_to_Nm", "positive"),
+    "grows_with_push_to": Key("grows_with_push_to_Nm", "positive"),
     "beyond": Key("beyond_Nm", "positive"),
     "net_above": Key("net_torque_above_Nm"),
     "net_beyond": Key("net_torque_beyond_Nm", "positive"),
@@ -189,7 +190,7 @@ _PLAYS = (
     ("compliance", ("ratchets_beyond", "after")),
 )
 _GOES = ((), ("at_load",), ("at_load", "power"), ("drags_over",), ("at_load", "drags_over"))
-_REACHES = (("compliance", ("reach",)), ("compliance", ("reach", "grows_to")))
+_REACHES = (("compliance", ("reach",)), *(("compliance", ("reach", grows)) for grows in GROWS))
 _STRENGTH = ("compliance", ("strength",))
 _SLACKENS = ("compliance", ("slackens",))
 _BY_A_REACH = tuple(law for law in FRICTION_LAWS if law not in SLIP_AT_A_STRENGTH)

@@ -183,7 +183,8 @@ def test_laws_of_the_library_are_written_with_the_grammar_of_their_word(word: st
                 "terms": [{"friction_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
             },
             "(reach_Nm, compliance_rad_per_Nm) or (reach_Nm, grows_with_net_torque_to_Nm, "
-            "compliance_rad_per_Nm) or (compliance_rad_per_Nm).",
+            "compliance_rad_per_Nm) or (reach_Nm, grows_with_push_to_Nm, compliance_rad_per_Nm) "
+            "or (compliance_rad_per_Nm).",
         ),
     ],
 )

@@ -104,16 +104,18 @@ def test_friction_may_outlast_the_way_to_another_pose() -> None:
     assert joint_hysteresis.outlasting(bench_without_arm(), lost) == []
 
 
+@pytest.mark.parametrize("key", ["grows_to", "grows_with_push_to"])
 @pytest.mark.parametrize("memory", ["", "worked in", "under weight", "rested"])
-def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
-    """Half as strong where half the net torque is carried, push and weights together."""
+def test_friction_may_grow_with_what_the_gear_carries(memory: str, key: str) -> None:
+    """Half as strong where half the torque is carried: push and weights together, or the push
+    alone where a spring carries the weights."""
     bench = make_bench(arm_data())
     grid = library(bench, ["joint_hysteresis"])
     found = next(v for v in grid if v.info["memory"] == memory and v.info["joint"] == 1)
-    finer = [v for v in joint_hysteresis.further(bench, found) if "grows_to" in v.info]
+    finer = [v for v in joint_hysteresis.further(bench, found) if key in v.info]
     assert {v.info["law"] for v in finer} == {*EXPONENTIAL, *SLIPPING}
     assert_lawful(bench, finer)
-    net = np.abs(bench.true_torque[:, 1] + bench.weight(1))
+    net = np.abs(bench.true_torque[:, 1] + (key == "grows_to") * bench.weight(1))
     n = bench.rows.n
     for v in finer:
         assert (v.info["joint"], v.info["memory"]) == (1, memory)
@@ -142,6 +144,15 @@ def test_friction_that_grows_sticks_over_short_reaches_as_over_long_ones(reach: 
         if "grows_to" in v.info
     ]
     assert min(misses) < 0.05 * np.linalg.norm(truth)
+
+
+def test_of_a_joint_without_weight_all_that_it_carries_is_the_push() -> None:
+    bench = make_bench(arm_data())
+    found = next(v for v in library(bench, ["joint_hysteresis"]) if v.info["joint"] == 0)
+    assert not bench.feels_weight(0)
+    finer = joint_hysteresis.further(bench, found)
+    assert any("grows_to" in v.info for v in finer)
+    assert not any("grows_with_push_to" in v.info for v in finer)
 
 
 def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:

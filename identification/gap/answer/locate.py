@@ -104,11 +104,14 @@ def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
         force = bench.rows.force[rows & (bench.rows.setup == s)]
         if force.size:
             old = out.get(setup.direction, (np.inf, -np.inf))
-            out[setup.direction] = (
-                min(old[0], float(force.min())),
-                max(old[1], float(force.max())),
-            )
+            low, high = force.min(), force.max()
+            nothing = _ROUNDING * max(abs(low), abs(high))  # sums of zeros and their datum
+            low, high = (float(v) if abs(v) > nothing else 0.0 for v in (low, high))
+            out[setup.direction] = min(old[0], low), max(old[1], high)
     return out
+
+
+_ROUNDING = 1e-12
 
 
 def _joints(engine: Engine, verdict: str, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]:

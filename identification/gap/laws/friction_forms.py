@@ -70,20 +70,26 @@ def spectrum_root(count: int) -> Array:
 def growing(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
     """Exponential laws of neighbouring reaches, part of whose friction grows in proportion to what
     the gear carries, push and weights together: teeth and bearings rub the more the harder they are
-    pressed (Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134, 2012)."""
+    pressed (Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134, 2012). Where the weights
+    are balanced, as by a spring, it carries the push alone."""
     torque, unit = bench.true_torque[:, joint], -bench.sense * bench.compliance[joint]
-    carries = np.abs(torque + bench.weight(joint))
-    top, out = float(carries.max()), []
-    reach = bench.reach_of(torque) * np.array(GROWS_OVER)
+    carried = friction_law.carried(bench, joint)
+    if not bench.feels_weight(joint):
+        del carried["grows_with_push_to"]  # the same
+    reach, out = bench.reach_of(torque) * np.array(GROWS_OVER), list[Variant]()
+    share = 0.25 / (4 * (len(reach) - 1)) / len(carried)
     for law in friction_law.exponential_laws(bench):
         held = reach * path.bristles(reach, law.startswith("Bouc-Wen"))
         slips = torque[:, None] if law in SLIPPING else 0.0
-        both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
-        each = [[bench.add_joint(joint, unit * h) for h in states] for states in both]
-        for (r, first), (s, second) in pairwise(zip(reach, each, strict=True)):
-            label, radius = f"{name} {law} {r:.3g} Nm grows", np.array([r, r, s, s])
-            facts = {"prior": 0.25 / (4 * (len(reach) - 1)), "grows_to": top}
-            out.append(shape(label, joint, [*first, *second], radius, law, **facts))
+        even = [bench.add_joint(joint, unit * h) for h in (held - slips).T]
+        for key, carries in carried.items():
+            top = float(carries.max())
+            grown = (held * carries[:, None] / top - slips).T
+            each = zip(reach, even, (bench.add_joint(joint, unit * h) for h in grown), strict=True)
+            for (r, *first), (s, *second) in pairwise(each):
+                label, radius = f"{name} {law} {r:.3g} Nm {key[:-3]}", np.array([r, r, s, s])
+                facts = {"prior": share, key: top}
+                out.append(shape(label, joint, [*first, *second], radius, law, **facts))
     return out
 
 

@@ -68,8 +68,7 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     terms = tuple(
         Term("compliance", {k: float(r)}) for k, r in zip(keys, v.info["radius"], strict=True)
     )
-    if "grows_to" in v.info:  # every other one
-        grown = {"grows_to": v.info["grows_to"]}
+    if grown := {key: v.info[key] for key in GROWS if key in v.info}:  # every other one
         terms = tuple(
             replace(t, shape={**t.shape, **grown}) if i % 2 else t for i, t in enumerate(terms)
         )
@@ -121,12 +120,20 @@ def _size_of(term: Term) -> float:
 
 
 def _grown(bench: Bench, law: Law, term: Term) -> Array:
-    """(n,) 1, or the net torque that a joint carries over that to which the friction grows."""
-    if "grows_to" not in term.shape:
+    """(n,) 1, or what a joint carries over that to which the friction grows."""
+    key = next((key for key in GROWS if key in term.shape), None)
+    if key is None:
         return np.ones(bench.rows.n)
-    joint = law.constants["joint"]
-    net = bench.true_torque[:, joint] + bench.weight(joint)
-    return np.asarray(np.abs(net) / term.shape["grows_to"])
+    return np.asarray(carried(bench, law.constants["joint"])[key] / term.shape[key])
+
+
+GROWS = ("grows_to", "grows_with_push_to")  # Nm carried at which what grows is as strong as stated
+
+
+def carried(bench: Bench, joint: int) -> dict[str, Array]:
+    """(n,) Nm that a joint carries: push and weights together, and the push alone."""
+    push = bench.true_torque[:, joint]
+    return dict(zip(GROWS, (np.abs(push + bench.weight(joint)), np.abs(push)), strict=True))
 
 
 def by_ratio(load: Array, span: float) -> Array:
