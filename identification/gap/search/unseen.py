@@ -37,6 +37,7 @@ _FURTHEST = SIZES[-1] / (_CLOSER[0] * _CLOSER[1])
 _COUNT = 4 * len(SIZES)  # in all
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
 _MOST = 3_000_000  # holds times rows: of more it would last longer than all the rest
+_FLOWING = 10  # times as long takes a path along which something flows
 _LOOKED_AT, _SEVERAL = 12, 3  # explanations; that remember, where none foretells the others
 _SELDOM = 0.5  # of the holds at most: whose law needs more is no law with a hand beside it
 _PARTS = 3  # of an explanation at most, where none foretells the others: more say nothing of loads
@@ -74,7 +75,8 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     if not at.size:
         return None
     first = found.explanations[0].log_weight
-    able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
+    quick = (e for e in found.explanations if _is_quick(e, at, rows))
+    able = (e for e in quick if told_by is None or len(e.parts) <= _PARTS)
     each = ((e, Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
     remember = ((first - e.log_weight, path) for e, path in _unlike(each))
     asked = (
@@ -94,7 +96,8 @@ def by_one_word(found: SearchResult) -> Iterator[Unseen]:
     which is right, may miss less along the straight path than the one that is."""
     engine, first = found.engine, found.explanations[0]
     at = _looked_for(engine)
-    single = (e for e in found.explanations if len(e.parts) == 1)
+    rows = engine.bench.rows
+    single = (e for e in found.explanations if len(e.parts) == 1 and _is_quick(e, at, rows))
     near = (e for e in single if e.log_weight > first.log_weight - _BEHIND)
     for e in islice(near, _SEVERAL) if at.size else ():
         path = Paths(engine, e, at, None)
@@ -117,6 +120,12 @@ def _looked_for(engine: Engine) -> Ints:
     at = brought_to(rows)
     able = len(at) >= _FEWEST and len(at) * rows.n <= _MOST
     return at if able else at[:0]
+
+
+def _is_quick(explanation: Explanation, at: Ints, rows: Rows) -> bool:
+    """Whether its paths before the holds `at` take no longer than those of the longest table."""
+    flows = any(part.variant.flows for part in explanation.parts)
+    return len(at) * rows.n * (_FLOWING if flows else 1) <= _MOST
 
 
 def _unlike(each: Iterable[tuple[Explanation, Paths]]) -> Iterator[tuple[Explanation, Paths]]:
