@@ -191,12 +191,32 @@ def _lines(
     top = max(abs(f) for one in design.levels for f in one)
     yield ""
     allowed = None if old is None else old.limits.force_N
-    yield from limit_lines(
+    lines = limit_lines(
         top,
         f"{_displacement_mm(old):g}",
         "  displacement_rate_mm_per_s: {max: 3, at: warn}",
         most_N=math.inf if allowed is None else allowed.max,
     )
+    yield from lines if old is None else _as_watched(lines, old)
+
+
+def _as_watched(lines: list[str], old: MeasurementProtocol) -> Iterator[str]:
+    """Lines of limits with those that do not depend on the procedure as somebody set them before:
+    nobody looks whether a proposal takes off what keeps an arm from harm."""
+    set_before = {
+        f"  {key}:": limit for key in _OF_THE_RIG if (limit := getattr(old.limits, key)) is not None
+    }
+    yield from (line for line in lines if not line.startswith(tuple(set_before)))
+    for key, limit in set_before.items():
+        yield f"{key} {{max: {limit.max:g}, at: {limit.at}}}"
+
+
+_OF_THE_RIG = (
+    "force_rate_N_per_s",
+    "displacement_rate_mm_per_s",
+    "joint_deviation_deg",
+    "joint_temperature_C",
+)
 
 
 def _sense(design: Design, direction: str) -> float:

@@ -13,12 +13,14 @@ from identification.gap.answer.designs import Design
 from identification.gap.data import Instruments
 from rig.diagnosis.next_protocol import (
     _apart,
+    _as_watched,
     _force_band,
     _rate_Hz,
     _seconds,
     _seen_to_the_end,
 )
 from rig.protocol_write import limit_lines, pose_line
+from rig.protocolfile import Limit, Limits
 
 
 @pytest.mark.parametrize(
@@ -43,6 +45,25 @@ def test_slots_that_were_late_do_not_make_another_rate(measured_s: float, rate_H
 def test_a_limit_is_not_raised_without_need(allowed_N: float | None, written: int) -> None:
     before = {} if allowed_N is None else {"most_N": allowed_N}
     assert f"  force_N: {{max: {written}, at: stop}}" in limit_lines(220.0, "9", **before)
+
+
+def test_what_was_watched_before_is_watched_no_less() -> None:
+    set_before = Limits(
+        joint_deviation_deg=Limit(max=3.0, at="stop"),
+        force_rate_N_per_s=Limit(max=60.0, at="stop"),
+        displacement_rate_mm_per_s=Limit(max=2.0, at="stop"),
+    )
+    old: Any = SimpleNamespace(limits=set_before)
+    rate = "  displacement_rate_mm_per_s: {max: 3, at: warn}"
+    assert list(_as_watched(limit_lines(220.0, "9", rate), old)) == [
+        "limits:",
+        "  force_N: {max: 258, at: stop}",
+        "  displacement_mm: {max: 9, at: stop}",
+        "  joint_temperature_C: {max: 60, at: stop}",
+        "  force_rate_N_per_s: {max: 60, at: stop}",
+        "  displacement_rate_mm_per_s: {max: 2, at: stop}",
+        "  joint_deviation_deg: {max: 3, at: stop}",
+    ]
 
 
 def planned(*levels: tuple[float, ...]) -> Design:
