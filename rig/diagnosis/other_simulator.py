@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.gap.data import Curve, GapData, Setup
+from identification.gap.model.other_springs import springs_along
 from rig.arrays import Array
 from rig.errors import InputError
 from rig.storage.columns import Values
@@ -24,9 +25,10 @@ SAME_FORCE = 1e-9
 
 
 def with_curves(data: GapData, csv: Path) -> GapData:
-    """With the curves (pose, direction, force_N, displacement_mm) of the data's setups. Points at
-    one force count as their mean, and where that is no small matter a note says so. InputError for
-    a table that holds no such curves.
+    """With the curves (pose, direction, force_N, displacement_mm) of the data's setups; a rig
+    without an arm is as stiff as these say, in place of what META does. Points at one force count
+    as their mean, and where that is no small matter a note says so. InputError for a table that
+    holds no such curves, or contradicts itself.
     """
     table = _read(csv)
     curves, notes = list[Curve](), list(data.notes)
@@ -35,7 +37,8 @@ def with_curves(data: GapData, csv: Path) -> GapData:
         measured = data.force[data.setup == s]
         notes += _doubts(csv, curve, apart, setup, measured, data.instruments.force)
         curves.append(curve)
-    return replace(data, curves=tuple(curves), notes=tuple(notes))
+    told = replace(data, curves=tuple(curves), notes=tuple(notes))
+    return told if data.arm else replace(told, compliance=springs_along(told))
 
 
 def _doubts(
@@ -80,14 +83,18 @@ def _read(csv: Path) -> dict[str, Values]:
         readings: dict[str, Reading] = {
             name: "number" if name in NUMBERS else "word" for name in file.names
         }
-        parts: dict[str, list[Values]] = {name: [] for name in file.names}
+        parts: dict[str, list[Values]] = {name: [] for name in (*file.names, _LINE)}
         for block in file.blocks():
             columns = parse(file, block, readings)
             for name, values in columns.items():
                 if name in NUMBERS:
                     _check_finite(file, block, name, values)
                 parts[name].append(values)
+            parts[_LINE].append(block.lines)
     return {name: np.concatenate(p) if p else np.empty(0) for name, p in parts.items()}
+
+
+_LINE = "line of the file"  # no column's name: these have no blanks
 
 
 def _check_names(file: CsvFile) -> None:
@@ -140,4 +147,17 @@ def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> tuple[Curve, Ar
     starts = np.flatnonzero(new)
     apart = np.maximum.reduceat(displacement, starts) - np.minimum.reduceat(displacement, starts)
     mean = np.bincount(level, displacement) / count
+    if apart.max() > _CONTRADICTS * np.ptp(mean):
+        at = level == apart.argmax()
+        lines = ", ".join(str(int(n)) for n in np.sort(table[_LINE][mine][order][at])[:_SHOWN])
+        raise InputError(
+            f"{csv}: lines {lines}: displacements that are {MM_PER_M * apart.max():.3g} mm apart "
+            f"at one force, {force[at][0]:.4g} N (pose {setup.pose or '-'}, direction "
+            f"{setup.direction}); wanted: one displacement at every force. Leave the wrong ones "
+            "out; of curves that depend on the path give the model itself: --model MODEL.yaml."
+        )
     return Curve(np.bincount(level, force) / count, mean), apart
+
+
+_CONTRADICTS = 0.5  # of all that the curve does: no branches of a loop are so far apart
+_SHOWN = 4  # lines

@@ -79,6 +79,11 @@ def test_beyond_two_points_at_the_largest_force_nothing_explodes(
         ("x,20,0.1\nx,20,0.3\n", "c.csv: 2 rows for pose -, direction x, all at one force;"),
         ("y,0,0\ny,20,0.3\n", "c.csv: 0 rows for pose -, direction x; wanted: at least 2"),
         ("", "c.csv: 0 rows for pose -, direction x"),
+        (
+            "x,100,1\nx,0,0\nx,100,9\n",
+            "c.csv: lines 2, 4: displacements that are 8 mm apart at one force, 100 N (pose -, "
+            "direction x); wanted: one displacement at every force.",
+        ),
     ],
 )
 def test_a_table_that_holds_no_curves(data: GapData, tmp_path: Path, rows: str, says: str) -> None:
@@ -116,6 +121,16 @@ def test_what_is_odd_about_curves_is_said(
     (tmp_path / "c.csv").write_text(HEAD + rows)
     notes = with_curves(data, tmp_path / "c.csv").notes[len(data.notes) :]
     assert notes == (() if says is None else (says,))
+
+
+@pytest.mark.parametrize("slope", [0.01, 0.013])  # mm/N; META states 0.01
+def test_a_rig_without_an_arm_is_as_stiff_as_its_curves(
+    data: GapData, tmp_path: Path, slope: float
+) -> None:
+    """As if META had that stiffness: thresholds and noise in mm go by it."""
+    (tmp_path / "c.csv").write_text(HEAD + f"x,0,0\nx,100,{100 * slope}\n")
+    found = with_curves(data, tmp_path / "c.csv")
+    assert found.compliance == pytest.approx([1e-3 * slope])
 
 
 def test_a_force_that_stands_still_has_no_range_to_cover(data: GapData, tmp_path: Path) -> None:

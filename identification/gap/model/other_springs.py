@@ -1,5 +1,5 @@
-"""Joints of another simulator, of which only curves are known: how its arm gives way along each
-direction, not which joint turns by how much."""
+"""Springs of another simulator, of which only curves are known: how its rig gives way along each
+direction; of an arm not which joint turns by how much."""
 
 from __future__ import annotations
 
@@ -29,6 +29,17 @@ def springs_behind(data: GapData) -> Array:
     scaled = each * sd
     dual = np.linalg.solve(scaled @ scaled.T + _EXACT**2 * np.eye(len(known)), missing)
     return np.asarray(stated * np.clip(1 + sd * (scaled.T @ dual), 1 / _SOFTEST, _SOFTEST))
+
+
+def springs_along(data: GapData) -> Array:
+    """(m,) m/N: of a rig without an arm, whose springs are what its curves say, those that give way
+    as they do on the whole, each along its own direction; as stated where a curve says nothing."""
+    slopes = [_slope(c, data.force[data.setup == s]) for s, c in enumerate(data.curves or ())]
+    out = data.compliance.copy()
+    for j in range(data.joints):
+        mine = [k for k, s in zip(slopes, data.setups, strict=True) if k > 0 and s.lever[j] != 0]
+        out[j] = np.mean(mine) if mine else out[j]
+    return out
 
 
 def _slope(curve: Curve, measured: Array) -> float:
