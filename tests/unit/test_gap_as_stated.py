@@ -24,13 +24,14 @@ SLANT, GAIN, CURVE = "load_misalignment", "force_scale", "joint_nonlinear_stiffn
 
 
 def found_off(off: float, explanations: tuple[Explanation, ...]) -> SearchResult:
-    """Explanations of an arm, one of whose springs is off by so many standard deviations."""
+    """Explanations of an arm, one of whose springs is too stiff by so many standard deviations."""
     bench = small_bench()
     bench.add(bench.stacked(1e-6 * np.sin(bench.load)))
     searched = search(small_engine_of(bench), library(bench, ["joint_creep"]))
     base = base_columns(bench)
     spring = base.names.index("spring1")
-    target = off * base.sd[spring] * base.columns[:, spring]
+    softer = 1 / (1 + off * base.sd[spring]) - 1
+    target = softer * base.columns[:, spring]
     arm = replace(bench, data=replace(bench.data, arm=True))
     engine = Engine(arm, base, target, np.array([0.0, 3e-6]))
     return replace(searched, engine=engine, explanations=explanations, unknown=-800.0)

@@ -203,6 +203,22 @@ class Engine:
         square = white.between(white, [w])[0] - shared.T @ shared
         return square, beside[0] - shared.T @ base.left, base.log_base
 
+    def of_base(
+        self, which: Sequence[int], columns: Sequence[int], root: Array, number: int
+    ) -> tuple[Array, Array]:
+        """Posterior mean (m,) and covariance (m, m) of coefficients of the base, beside columns
+        (k,) of the pool with the root (k, r) of their prior covariance, at a level."""
+        base = self._bases[number]
+        turn = base.turn[:, list(which)]
+        if not columns:
+            return turn.T @ base.left, turn.T @ turn
+        inner = np.eye(root.shape[1]) + root.T @ self.square(tuple(columns))[number] @ root
+        turned = np.linalg.solve(factor_of(inner), root.T)  # of the covariance beside the base
+        w = turned.T @ (turned @ self.levels[number].moment[list(columns)])
+        shared = base.pool.values[list(columns)]
+        beside = turned @ shared @ turn
+        return turn.T @ (base.left - shared.T @ w), turn.T @ turn + beside.T @ beside
+
     def _of_mean(self) -> Array:
         """(m holds,) direction of the mean of a joint's readings in a run, of length 1."""
         length = self._length_q.reshape(-1, len(self._edges))

@@ -24,6 +24,7 @@ from identification.gap.evidence.parts import (
     part_sizes,
     signs_kept,
 )
+from identification.gap.evidence.stiffness import as_stiff_as_stated
 from identification.gap.explanations.penalties import (
     TOE_AND_KNEE,
     below_noise,
@@ -172,7 +173,7 @@ def explain(
         log_evidence += evidence_correction(engine, parts, taken, bases)
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= below_noise(engine, parts, sizes) + unbent_curves(engine, parts, sizes)
-    weight -= within_stated(engine, parts, sizes)
+    weight += as_stiff_as_stated(engine, parts, best) - within_stated(engine, parts, sizes)
     if len(parts) > 1:
         weight -= sum(p.variant.cost for p in parts[:-1])
         weight -= minor_parts(engine, parts, sizes) + cancelling(engine, parts, sizes, each)

@@ -98,7 +98,10 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     moves = np.sqrt(weight @ columns**2 / where)  # rms per unit, where it acts
     moves[base.index("offset")] = LEVER_M
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
-    pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
+    springs = list(base.springs.values())
+    stated = fitted.base.copy()
+    stated[springs] = [_of_stiffness(float(change)) for change in stated[springs]]
+    pulls = np.abs(stated) / np.hypot(base.sd, loose)
     for j in _springs_that_may(engine, fitted):
         pulls[base.index(f"spring{j + 1}")] = 0.0
     left = _left_at_rest(engine, fitted)
@@ -115,21 +118,25 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
 
 def most_off(engine: Engine, fitted: Fit) -> float:
     """By how many standard deviations springs and gains are off at most, but for those that may be.
-    What is normal in the compliance is not in the stiffness, nor what is normal in a gain in the
-    share of its readings that is too much: by both."""
+    What is normal in a gain is not in the share of its readings that is too much: by both."""
     return max(_springs_and_gains(engine, fitted).values(), default=0.0)
 
 
 def _springs_and_gains(engine: Engine, fitted: Fit) -> dict[str, float]:
-    """Name -> standard deviations, by compliance or stiffness."""
+    """Name -> standard deviations."""
     base, out = engine.base, {}
     free = {f"spring{j + 1}" for j in _springs_that_may(engine, fitted)}
     for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
-        if not name.startswith(("spring", "gain")) or name in free:
-            continue
-        whole = 1 + change if name.startswith("spring") else 1 - change
-        out[name] = max(abs(change) / sd, abs(change / max(whole, _NEARLY_NONE)) / sd)
+        if name.startswith("spring") and name not in free:
+            out[name] = abs(_of_stiffness(change)) / sd
+        elif name.startswith("gain"):
+            out[name] = max(abs(change), abs(change / max(1 - change, _NEARLY_NONE))) / sd
     return out
+
+
+def _of_stiffness(change: float) -> float:
+    """Relative change of a stiffness by one of its compliance: what is stated of springs."""
+    return change / max(1 + change, _NEARLY_NONE)
 
 
 _NEARLY_NONE = 1e-6

@@ -215,7 +215,8 @@ def _offsets(bench: Bench) -> list[_Part]:
     ]
     if bench.noise.q_setup > 0:
         each = np.eye(len(poses), dtype=bool).tolist()
-        groups += [(f"setup {s}", mine, bench.noise.q_setup) for s, mine in enumerate(each)]
+        several = [s for s, pose in enumerate(poses) if poses.count(pose) > 1]
+        groups += [(f"setup {s}", each[s], bench.noise.q_setup) for s in several]
     for name, setups, sd in groups:
         mine = np.array(setups)[rows.setup]
         for j in range(bench.data.joints):

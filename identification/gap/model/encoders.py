@@ -14,6 +14,7 @@ from identification.gap.recording.rows import Rows
 from identification.gap.recording.white import QUARTILE
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
+RESTS_RAD = 1e-5  # at rest a controller leaves a joint elsewhere by about what it can read
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
 
 
@@ -39,7 +40,8 @@ def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
         if step > 0 and in_one_number(data.q[:, j], hold):
             means = rows.hold_means(rows.q[:, j])
             rounded[j] = left_of(means, rows.setup[rows.edges], step)
-    return Readings(one, rounded, *_between_runs(data, rows, one))
+    run, setup = _between_runs(data, rows, one)
+    return Readings(one, rounded, run, max(setup, RESTS_RAD))
 
 
 def _one(data: GapData, rows: Rows, hold: Ints) -> Array:

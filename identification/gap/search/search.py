@@ -12,6 +12,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.finer import BELOW, PARTS, gained
 from identification.gap.evidence.imperfection import LOG_STEP
 from identification.gap.evidence.parts import Part, log_joint_between, part_sizes
+from identification.gap.evidence.stiffness import as_stiff_as_stated
 from identification.gap.explanations.explanation import (
     Explanation,
     SearchResult,
@@ -58,7 +59,8 @@ def search(
     for word, scored in families.items():
         pool[frozenset([word])] = joined(engine, (), scored, 0.0)
     none = _as_stated(engine)
-    empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
+    whole = none + as_stiff_as_stated(engine, (), 0) + LOG_NONE
+    empty = Explanation((), whole, 0.0, (), whole)
     pool[frozenset()] = empty
     seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
     singly = _seeds(pool, seeds)
@@ -313,7 +315,9 @@ def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
     What was stated was looked at between them before, and shuts out nobody by what it gained there;
     but for what laws of the simulation's own effects may leave."""
     done: dict[frozenset[str], Explanation] = {}
-    stated = engine.levels[0].log_base + LOG_NONE if engine.bench.known is None else np.inf
+    stiff = as_stiff_as_stated(engine, (), 0)
+    stated = engine.levels[0].log_base + stiff + LOG_NONE
+    stated = stated if engine.bench.known is None else np.inf
     first = max(e.log_weight if e.parts else min(e.log_weight, stated) for e in ranked)
     most = 0.0
     for _ in range(_SHARPENED):

@@ -1,0 +1,99 @@
+"""Springs of an arm as they are stated: normal in the stiffness.
+
+All else is linear in the compliances, and so are the columns of the springs; the evidence counts
+them as normal in the compliance, of the same relative size. That is the same for small changes, but
+half a stiffness that is known to a fifth is 2.5 standard deviations off, twice the compliance 5. So
+evidence is put right by the ratio of the two integrals over the springs alone, all else integrated
+out: the one exact, the other in the coordinates in which the stiffness is standard normal by
+Laplace's method (Tierney and Kadane, J. Am. Stat. Assoc. 81 (1986) 82-86), which is exact for
+springs that the data say nothing of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.factor import factor_of
+from identification.gap.evidence.parts import Part
+from identification.gap.model.variants import block
+
+_LEAST = 0.05  # of the stated stiffness: what is left at least
+_TURNS, _THERE = 30, 1e-6  # steps at most; nats
+
+
+def as_stiff_as_stated(engine: Engine, parts: Sequence[Part], level: int) -> float:
+    """Nats to add to the evidence of parts at a level; 0 for a rig without an arm, of which laws
+    bring a stiffness of their own."""
+    springs = list(engine.base.springs.values())
+    if not engine.bench.data.arm or not springs:
+        return 0.0
+    columns = [c for p in parts for c in p.variant.columns]
+    mean, covariance = engine.of_base(springs, columns, block([p.root for p in parts]), level)
+    return log_ratio(mean, covariance, engine.base.sd[springs])
+
+
+def log_ratio(mean: Array, covariance: Array, sd: Array) -> float:
+    """log of the evidence under a prior that is normal in the stiffness, over that under one that
+    is normal in the compliance.
+
+    mean (m,), covariance (m, m): posterior of relative changes of the compliance under the latter;
+    sd (m,): relative, of both priors.
+    """
+    precision = np.asarray(np.linalg.inv(covariance / np.outer(sd, sd)))
+    asked = precision @ (mean / sd)
+    springs = _Springs(sd, precision - np.eye(len(sd)), asked)
+    u = (1 / np.maximum(1 + mean, _LEAST) - 1) / sd
+    here = springs.at(u)
+    for _ in range(_TURNS):
+        further, there = u, here
+        for share in _SHARES:
+            further = np.maximum(u - share * here.step, (_LEAST - 1) / sd)
+            there = springs.at(further)
+            if there.value <= here.value:
+                break
+        gained, u, here = here.value - there.value, further, there
+        if gained < _THERE:
+            break
+    size = np.log(np.diag(factor_of(here.curved)) / np.diag(factor_of(precision))).sum()
+    return float(-0.5 * (asked @ (mean / sd)) - here.value - size)
+
+
+_SHARES = (1.0, 0.5, 0.25, 0.1, 0.01)  # of a step
+
+
+class _At(NamedTuple):
+    """-log of prior and likelihood, Newton's step (m,) from there, and the second derivatives
+    (m, m) that it was made with."""
+
+    value: float
+    step: Array
+    curved: Array
+
+
+class _Springs(NamedTuple):
+    """sd (m,), relative; of changes of the compliance in units of it: precision (m, m) by the data
+    alone, and what that of data and prior asks for (m,)."""
+
+    sd: Array
+    told: Array
+    asked: Array
+
+    def at(self, u: Array) -> _At:
+        """Of stiffnesses that are u (m,) standard deviations off."""
+        whole = 1 / np.maximum(1 + self.sd * u, _LEAST)
+        change, first, second = -u * whole, -(whole**2), 2 * self.sd * whole**3
+        left = self.told @ change - self.asked
+        value = 0.5 * float(u @ u) + 0.5 * float(change @ (left - self.asked))
+        curved = np.eye(len(u)) + first[:, None] * self.told * first
+        # where that is no longer convex, without what bends the parameters (Gauss-Newton)
+        bent = curved + np.diag(second * left)
+        curved = bent if np.linalg.eigvalsh(bent)[0] > _CONVEX else curved
+        return _At(value, np.asarray(np.linalg.solve(curved, u + first * left)), curved)
+
+
+_CONVEX = 0.1

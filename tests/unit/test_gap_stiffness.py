@@ -1,0 +1,123 @@
+"""Springs count as normal in the stiffness, in which they are stated, not in the compliance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.evidence.stiffness import as_stiff_as_stated, log_ratio
+from identification.gap.explanations.fit import fit
+from identification.gap.judging.strain import most_off
+from identification.gap.model.base import base_columns
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import variant
+from tests.conformance.gap_designs import linear
+from tests.explained import explained
+from tests.unit.small_explanations import said
+
+
+def by_sampling(mean: Array, covariance: Array, sd: Array) -> float:
+    """log of the ratio of the two integrals, each a mean of the likelihood over its own prior."""
+    rng = np.random.default_rng(0)
+    told = np.linalg.inv(covariance) - np.diag(sd**-2.0)
+    asked = np.linalg.solve(covariance, mean)
+    u = rng.normal(size=(1_000_000, len(sd)))
+    whole = 1 + sd * u
+    logs = [
+        -0.5 * np.einsum("ni,ij,nj->n", x, told, x) + x @ asked
+        for x in (1 / whole[(whole > 0.05).all(axis=1)] - 1, sd * u)
+    ]
+    stiffness, compliance = (np.log(np.mean(np.exp(v - v.max()))) + v.max() for v in logs)
+    return float(stiffness - compliance)
+
+
+@pytest.mark.parametrize("mean", [0.1, -0.15, 0.3, 0.6])
+@pytest.mark.parametrize("known", [0.02, 0.1])
+def test_the_ratio_is_that_of_the_integrals_over_one_spring(mean: float, known: float) -> None:
+    args = np.array([mean]), np.array([[known**2]]), np.array([0.2])
+    assert log_ratio(*args) == pytest.approx(by_sampling(*args), abs=0.1)
+
+
+def test_the_ratio_is_that_of_the_integrals_over_springs_that_the_data_mix() -> None:
+    sd = np.array([0.15, 0.1, 0.2])
+    mixed = np.array([[1.0, 1.0, 0.0], [1.0, -0.4, 0.3]])  # two sums are told, a third one is not
+    covariance = np.linalg.inv(np.diag(sd**-2.0) + mixed.T @ mixed / 0.05**2)
+    mean = covariance @ mixed.T @ np.array([0.4, 0.25]) / 0.05**2
+    found = log_ratio(mean, covariance, sd)
+    assert found == pytest.approx(by_sampling(mean, covariance, sd), abs=0.1)
+    assert found > 0.2
+
+
+def test_half_a_stiffness_is_as_unlikely_as_its_deviation_and_no_more() -> None:
+    """Stated to a fifth: 2.5 standard deviations, not 5; the density of the compliance there is a
+    quarter of that of the stiffness."""
+    found = log_ratio(np.array([1.0]), np.array([[1e-8]]), np.array([0.2]))
+    assert found == pytest.approx(0.5 * (5.0**2 - 2.5**2) + np.log(0.25), abs=1e-3)
+
+
+def test_what_the_data_say_nothing_of_is_as_likely_as_before() -> None:
+    assert log_ratio(np.zeros(2), np.diag([0.04, 0.01]), np.array([0.2, 0.1])) == pytest.approx(0)
+
+
+def one_soft_spring(bench: Bench, softer: float) -> Array:
+    """What is read where the first spring that is seen gives so much more."""
+    return softer * base_columns(bench).columns[:, base_columns(bench).index("spring")[0]]
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return make_bench(linear("medium"))
+
+
+def test_an_engine_knows_what_it_found_of_the_springs(bench: Bench) -> None:
+    """As a fit does, alone and beside an effect."""
+    base = base_columns(bench)
+    engine = Engine(bench, base, one_soft_spring(bench, 0.4), np.array([0.0, 3e-6]))
+    bends = bench.add(bench.stacked(1e-6 * bench.load**2 / bench.load.max()))
+    curve = Part(variant("joint_nonlinear_stiffness", "", [bends], (1.0,)), 1.0)
+    springs = base.index("spring")
+    for parts in ((), (curve,)):
+        whole = fit(engine, replace(said((), ()), parts=parts))
+        columns = [c for p in parts for c in p.variant.columns]
+        root = curve.root if parts else np.zeros((0, 0))
+        mean, covariance = engine.of_base(springs, columns, root, 0)
+        np.testing.assert_allclose(mean, whole.base[springs], rtol=1e-6, atol=1e-9)
+        block = whole.joint_covariance[np.ix_(springs, springs)]
+        np.testing.assert_allclose(covariance, block, rtol=1e-6, atol=1e-12)
+
+
+def test_only_springs_of_an_arm_count_so(bench: Bench) -> None:
+    target = one_soft_spring(bench, 0.4)
+    without = replace(bench, data=replace(bench.data, arm=False))
+    ratios = [
+        as_stiff_as_stated(Engine(b, base_columns(b), target, np.array([0.0, 3e-6])), (), 0)
+        for b in (bench, without)
+    ]
+    assert ratios[0] > 1.0
+    assert ratios[1] == 0.0
+
+
+def test_a_spring_is_off_by_its_stiffness(bench: Bench) -> None:
+    base = base_columns(bench)
+    (first, *_), sd = base.index("spring"), base.sd[base.index("spring")[0]]
+    target = one_soft_spring(bench, 1 / (1 - 2.5 * sd) - 1)
+    engine = Engine(bench, base, target, np.array([0.0, 3e-6]))
+    nothing = fit(engine, said((), ()))
+    assert abs(nothing.base[first]) / sd > 2.8
+    assert most_off(engine, nothing) == pytest.approx(2.5, abs=0.15)
+
+
+def test_one_spring_two_and_a_half_deviations_soft_is_no_fault() -> None:
+    data = linear("rich")
+    sd = data.compliance_relative_sd.copy()
+    sd[:] = 0.15
+    stated = data.compliance.copy()
+    stated[1] *= 1 - 2.5 * 0.15  # what was simulated is stiffer than what was measured
+    found = explained(replace(data, compliance=stated, compliance_relative_sd=sd))
+    assert found.verdict == "none"
+    assert found.probabilities["none"] > 0.8
