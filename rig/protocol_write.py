@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.times import SETTLE_S
-from rig.protocolfile import Settle
+from rig.protocolfile import Limit, Limits, Settle
 
 # Where no earlier protocol says what counts as settled.
 _SETTLE = Settle(
@@ -40,22 +41,35 @@ def settle_lines(settle: Settle = _SETTLE) -> list[str]:
     return ["settle:", *(f"  {k}: {v}" for k, v in written.items())]
 
 
-def limit_lines(
-    top_N: float, displacement_mm: str, *more: str, most_N: float = float("inf")
-) -> list[str]:
-    """What stops the measurement: a force beyond the largest load top_N, and beyond most_N, which
-    was allowed before, if that load is not; a displacement; more: further lines, after these."""
+# Of the rig, whatever is done with it, where nobody said otherwise before.
+_USUAL = Limits(
+    displacement_rate_mm_per_s=Limit(max=3, at="warn"),
+    joint_deviation_deg=Limit(max=5, at="stop"),
+    joint_temperature_C=Limit(max=60, at="stop"),
+)
+
+
+def limit_lines(top_N: float, displacement_mm: float, before: Limits) -> list[str]:
+    """What is watched: the force, up to the largest load top_N and a little more; a displacement;
+    of the rig itself what is usual. Nothing is allowed that was not before, but for a load that is
+    asked for."""
     force = float(round(1.15 * top_N + 5))
-    if top_N < most_N / _OVER < force:
-        force = most_N
-    return [
-        "limits:",
-        f"  force_N: {{max: {force:.6g}, at: stop}}",
-        f"  displacement_mm: {{max: {displacement_mm}, at: stop}}",
-        *more,
-        "  joint_deviation_deg: {max: 5, at: stop}",
-        "  joint_temperature_C: {max: 60, at: stop}",
-    ]
+    allowed = before.force_N.max if before.force_N is not None else inf
+    if top_N < allowed / _OVER < force:
+        force = allowed
+    far = before.displacement_mm
+    watched = {
+        "force_N": Limit(max=force, at=before.force_N.at if before.force_N else "stop"),
+        "displacement_mm": Limit(
+            max=displacement_mm if far is None else min(displacement_mm, far.max),
+            at="stop" if far is None else far.at,
+        ),
+    }
+    for f in fields(Limits):
+        limit = getattr(before, f.name) or getattr(_USUAL, f.name)
+        if limit is not None:
+            watched.setdefault(f.name, limit)
+    return ["limits:", *(f"  {k}: {{max: {v.max:.6g}, at: {v.at}}}" for k, v in watched.items())]
 
 
 def numbers(values: ArrayLike, digits: int) -> str:

@@ -9,7 +9,9 @@ from math import inf
 from identification.arrays import Flags
 from identification.gap.answer.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.answer.forms import Form
+from identification.gap.answer.found_notes import there_already
 from identification.gap.answer.known import in_question, is_gone, knowing
+from identification.gap.answer.notes import ordered
 from identification.gap.answer.posterior import settled
 from identification.gap.answer.result import ALIKE, GapResult, result_of, with_twins
 from identification.gap.data import GapData
@@ -93,6 +95,7 @@ def explain_gap(
     result = replace(result, gone=gone)
     if not forced <= plain.words:
         result = replace(result, without_added=left_of(found.engine, fit(found.engine, plain)))
+    result = replace(result, said=ordered([*result.said, *there_already(plain, forced)]))
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)

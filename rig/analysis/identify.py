@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,8 @@ from rig.dataset import Dataset, load_each
 from rig.errors import InputError
 from rig.models.model import load_model
 from rig.models.robot import load_robot
+from rig.protocol_before import limits_before
+from rig.protocolfile import Limits
 from rig.storage.files import legible
 from rig.units import MM_PER_M
 
@@ -28,7 +30,7 @@ from rig.units import MM_PER_M
 @dataclass(frozen=True, eq=False)
 class IdentifyResult:
     """Fit, the observations behind it, and the proposed next poses with their load. doubts: what
-    makes the fit doubtful."""
+    makes the fit doubtful; limits: what was watched in the data sets."""
 
     datasets: tuple[str, ...]
     arm: Arm
@@ -40,6 +42,7 @@ class IdentifyResult:
     notes: tuple[str, ...]
     banners: tuple[str, ...] = ()
     made_from: str = ""
+    limits: Limits = field(default_factory=Limits)
 
     @property
     def emulated(self) -> bool:
@@ -145,6 +148,7 @@ def identify(
         notes=tuple(notes),
         banners=tuple(dict.fromkeys(b for d in datasets for b in d.banners())),
         made_from=_made_from(datasets, prior),
+        limits=limits_before(datasets),
     )
 
 

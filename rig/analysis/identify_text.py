@@ -107,7 +107,7 @@ def protocol_text(result: IdentifyResult) -> str:
         + "\n".join(settle_lines())
         + "\nstep_deadline_s: 300\nzero: {before_s: 6, after_s: 6}\nrest_s: 10\n"
         "rated_load_N: null\n\n"
-        + "\n".join(limit_lines(greatest, f"{min(9.5, 2e3 * softest + 1):.1f}"))
+        + "\n".join(limit_lines(greatest, round(min(9.5, 2e3 * softest + 1), 1), result.limits))
         + "\n"
     )
 

@@ -34,9 +34,10 @@ class Line:
 
     @property
     def met(self) -> bool | None:
-        """Whether the figure itself (not its interval) is as good as what is aimed at."""
+        """Whether the figure itself (not its interval) is as good as what is aimed at; of a rate
+        over few cases nobody can say."""
         m = self.measure
-        if self.value is None or m.target is None:
+        if self.value is None or m.target is None or (self.n is not None and self.n < _FEW):
             return None
         if m.upper is not None:
             return m.target <= self.value <= m.upper
@@ -51,6 +52,9 @@ class Line:
         if m.upper is not None:
             return f"{m.target:g} to {m.upper:g}"
         return f"{'>=' if m.at_least else '<='} {m.target:g}"
+
+
+_FEW = 20  # cases
 
 
 MEASURES = (

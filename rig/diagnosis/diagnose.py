@@ -250,11 +250,12 @@ def _where(r: GapResult) -> dict[str, Any]:
 
 
 def _gap(r: GapResult) -> dict[str, Any]:
-    held = [_held(h) for h in r.held_out]
+    held = [_held(h, r.noise) for h in r.held_out]
     return {
         "noise_rms_mm": r.noise * MM_PER_M,
         "before_rms_mm": r.before * MM_PER_M,
         "after_rms_mm": r.after * MM_PER_M,
+        "after_over_noise": over(r.after, r.noise),
         "shrink_factor": r.before / r.after if min(r.before, r.after) > 0 else 1.0,
         **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM_PER_M}),
         "held_out": held[0] if held else None,
@@ -286,11 +287,17 @@ def _remainder(r: GapResult) -> dict[str, Any]:
     }
 
 
-def _held(h: HeldOut) -> dict[str, Any]:
+def over(after: float, noise: float) -> float:
+    """What is left in units of the noise; 1 where there is no noise."""
+    return after / noise if noise > 0 else 1.0
+
+
+def _held(h: HeldOut, noise: float) -> dict[str, Any]:
     return {
         "fold": h.fold,
         "before_rms_mm": h.before * MM_PER_M,
         "after_rms_mm": h.after * MM_PER_M,
+        "after_over_noise": over(h.after, noise),
         "shrink_factor": h.shrink,
         "ci95": list(h.ci95),
         "own_datum": h.own_datum,

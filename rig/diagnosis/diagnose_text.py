@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from identification.gap.answer.result import EffectFound, GapResult
     from identification.gap.explanations.explanation import Likeness
     from identification.gap.laws.interval import Parameter
+    from identification.gap.model.bench import Bench
 
 _MORE = 1.01  # times the rest that is not left by rounding
 
@@ -220,7 +221,7 @@ def answer(
 
 def _where(r: GapResult) -> str:
     w = r.where
-    if not w.directions:
+    if not w.directions or not any(force != (0.0, 0.0) for force in w.force.values()):
         return ""
     forces = ", ".join(f"{d}: {brief(a)} to {brief(b)} N" for d, (a, b) in w.force.items())
     lines = [f"Where ({_share(w.share)} of the gap that springs leave)", f"  directions  {forces}"]
@@ -263,9 +264,19 @@ def _one_effect(e: EffectFound, title: str) -> list[str]:
         each = ", ".join(f"{place} ({likely(p)})" for place, p in e.places.items())
         lines.append(f"    these data leave open where it sits: {each}")
     lines += _parameters(e.parameters)
+    if e.parameters and e.probability > _SURELY and all(_open(p) for p in e.parameters.values()):
+        lines.append("    surer that it is there than how large, or which way it goes, alone")
     if e.indistinguishable_from:
         lines.append(f"    can't be told apart from {', '.join(e.indistinguishable_from)} here")
     return lines
+
+
+_SURELY = 0.95  # there
+
+
+def _open(p: Parameter) -> bool:
+    """Whether its interval leaves open which way it goes."""
+    return p.low < 0 < p.high or (p.low < p.high and 0 in (p.low, p.high))
 
 
 T = TypeVar("T")
@@ -309,7 +320,9 @@ def _parameters(found: Mapping[str, Parameter]) -> list[str]:
 def _value(p: Parameter) -> str:
     unit = "" if p.unit == "1" else f" {p.unit}"
     largest = "" if p.cut_at is None else f"; the largest seen is {brief(p.cut_at)}{unit}"
-    return f"{brief(p.value)}{unit} (95 %: {brief(p.low)} to {brief(p.high)}{unit}{largest})"
+    ended = p.low < p.high and p.value in (p.low, p.high)
+    limit = "; at the limit of what is possible" if ended else ""
+    return f"{brief(p.value)}{unit} (95 %: {brief(p.low)} to {brief(p.high)}{unit}{largest}{limit})"
 
 
 def _gap(r: GapResult) -> str:
@@ -323,15 +336,30 @@ def _gap(r: GapResult) -> str:
         if r.after > _MORE * r.without_added:
             lines.append("  What was added is no explanation: more is left with it than without.")
     for h in r.held_out:
+        if not max(h.before, h.after) > 0:
+            continue  # nothing to judge there
         low, high = h.ci95
         open_to = f" ({brief(low, 3)} to {brief(high, 3)})" if low < high else ""
         lines.append(_row(f"withheld {h.fold}", h.before, h.after, r.noise) + open_to)
     lines.append(f"  {'noise of the instruments':32s}{brief(r.noise * MM_PER_M):>9s}")
     told = less_datum(h.fold for h in r.held_out if h.own_datum)
     lines += [f"  {told}"] if told else []
+    lines += [f"  {told}"] if (told := in_newtons(r.bench)) else []
     for word, after in r.runners_up.items():
-        lines.append(f"  withheld, with {word} instead: {brief(after * MM_PER_M)}")
+        lines.append(f"  withheld, with {word} alone: {brief(after * MM_PER_M)}")
     return "\n".join(lines)
+
+
+def in_newtons(bench: Bench) -> str:
+    """What a millimetre of the gap is, where it is one of force; empty where it is none."""
+    if not bench.imposed or bench.data.arm:
+        return ""
+    data = bench.data
+    along = [f" along {data.spring_name(j)}" if data.joints > 1 else "" for j in range(data.joints)]
+    each = [
+        f"{brief(1 / (MM_PER_M * c))} N{of}" for c, of in zip(data.compliance, along, strict=True)
+    ]
+    return f"the gap is one of force, over the simulated stiffness: 1 mm is {', '.join(each)}"
 
 
 def less_datum(folds: Iterable[str]) -> str:

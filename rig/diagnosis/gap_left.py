@@ -151,6 +151,8 @@ def _of_sense(rest: Remainder, sense: int) -> Any:
 def _remainder_title(shown: Shown, rest: Remainder) -> str:
     low, high = (edge * MM_PER_M for edge in rest.ci95)
     differs = _unrepeated(rest, finer=shown.continuous)
+    if rest.largest is None and rest.visits <= 1:
+        return f"Left {shown.with_what}: {differs}"
     if rest.largest is None:
         seen = f"nothing that repeats for sure (95 %: below {high:.2g} mm rms)"
         return f"Left {shown.with_what}: {seen}; {differs}"

@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.answer.forms import Form, describe, lasting
+from identification.gap.answer.found_notes import joints_missed
 from identification.gap.answer.result import EffectFound, GapResult
 from rig.dataset import Dataset
 from rig.diagnosis.diagnose import Diagnosis
@@ -54,9 +55,12 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
         "unknown": f"in which something is missing, and what is unknown ({sure})",
     }.get(result.verdict, f"with what rig diagnose found missing in it: {result.verdict} ({sure})")
     gone = "; left out as it is not in the data: " + " and ".join(result.gone)
+    means = ", ".join(str(j + 1) for j in joints_missed(result.engine, result.fit))
+    mean = [f"# A mean over the measured loads, of which it shows more: joint {means}."]
     lines = [
         f"# The simulation {found}{gone if result.gone else ''}.",
         f"# Data set: {dataset.uuid}",
+        *(mean if means else []),
         f"note: {json.dumps(note)}",
         *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *_believed(result)),
         *_outside(diagnosis),
@@ -92,7 +96,8 @@ def _believed(result: GapResult) -> tuple[Array, Array]:
 
 def springs(result: GapResult) -> tuple[Array, Array]:
     """Joint stiffnesses (m,) Nm/rad after the fit and their standard deviations (m,), an effect
-    `joint_stiffness_error` included: compliance times (1 + sum of the coefficients)."""
+    `joint_stiffness_error` included: compliance times (1 + sum of the coefficients). A joint that
+    turns otherwise than its spring is no better known than by as much."""
     bench, fitted = result.bench, result.fit
     sums = np.zeros((bench.data.joints, len(fitted.joint_covariance)))
     for i, name in enumerate(result.engine.base.names):
@@ -108,8 +113,10 @@ def springs(result: GapResult) -> tuple[Array, Array]:
     variance = np.maximum(np.einsum("ij,jk,ik->i", sums, fitted.joint_covariance, sums), 0.0)
     unseen = ~sums.any(axis=1)
     variance[unseen] = bench.data.compliance_relative_sd[unseen] ** 2
-    stiffness = 1 / (bench.compliance * factor)
-    return stiffness, stiffness * np.sqrt(variance) / factor
+    stiffness, relative = 1 / (bench.compliance * factor), np.sqrt(variance) / factor
+    for j, missed in joints_missed(result.engine, fitted).items():
+        relative[j] = np.hypot(relative[j], missed.share)  # a mean over these loads
+    return stiffness, stiffness * relative
 
 
 def forms(result: GapResult) -> list[Form]:

@@ -70,7 +70,7 @@ def withheld(shown: Shown) -> Figure:
         main = shown.held_out[0]
         entries.append(
             (
-                f"withheld {main.fold},\nwith {word} instead",
+                f"withheld {main.fold},\nwith {word} alone",
                 main.before,
                 after,
                 change(main.before, after),
@@ -94,7 +94,7 @@ def withheld(shown: Shown) -> Figure:
         axes.plot(a, i, "o", color=colour, markersize=8)
     axes.plot([], [], "o", color=GREEN, label=f"after, {shown.with_what}")
     if shown.runners_up:
-        axes.plot([], [], "o", color=COLOURS[3], label="after, with another effect instead")
+        axes.plot([], [], "o", color=COLOURS[3], label="after, with another effect alone")
     axes.axvline(
         shown.noise * MM_PER_M, color=BLUE, linestyle="--", label="noise of the instruments"
     )

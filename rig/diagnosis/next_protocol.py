@@ -22,6 +22,7 @@ from rig.meta import Meta
 from rig.models.robot import load_robot
 from rig.plan import plan
 from rig.protocol import MeasurementProtocol, parse_protocol
+from rig.protocol_before import limits_before, protocol_before
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
 from rig.protocolfile import ForceBand
 from rig.station import load_station
@@ -70,7 +71,7 @@ def check_arm(dataset: Dataset) -> None:
 
 def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
     """The protocol file. Loads are lowered until arm, laser and dynamometer can take them."""
-    old = _old_protocol(dataset)
+    old = protocol_before(dataset)
     assert proposal.design is not None
     most = _LATEST_STOP * _displacement_mm(old)
     design, stops = _seen_to_the_end(proposal.design, proposal.reached, most)
@@ -139,17 +140,6 @@ def _apart(design: Design) -> Design:
     return replace(design, levels=tuple(levels))
 
 
-def _old_protocol(dataset: Dataset) -> MeasurementProtocol | None:
-    """The protocol that the data set was measured with; None for an imported table."""
-    text = dataset.texts.get("protocol", "")
-    if not text:
-        return None
-    try:
-        return parse_protocol(text, dataset.path or Path("data set"))
-    except InputError:
-        return None
-
-
 def _lines(
     proposal: NextMeasurement,
     design: Design,
@@ -187,36 +177,12 @@ def _lines(
     yield f"repetitions: {design.repetitions}"
     yield f"branches: {'loading-unloading' if design.unload else 'loading'}"
     yield "order: by_run"
-    yield from _timing(design, old)
+    yield from _timing(design, old, proposal.present)
     top = max(abs(f) for one in design.levels for f in one)
     yield ""
-    allowed = None if old is None else old.limits.force_N
-    lines = limit_lines(
-        top,
-        f"{_displacement_mm(old):g}",
-        "  displacement_rate_mm_per_s: {max: 3, at: warn}",
-        most_N=math.inf if allowed is None else allowed.max,
-    )
-    yield from lines if old is None else _as_watched(lines, old)
-
-
-def _as_watched(lines: list[str], old: MeasurementProtocol) -> Iterator[str]:
-    """Lines of limits with those that do not depend on the procedure as somebody set them before:
-    nobody looks whether a proposal takes off what keeps an arm from harm."""
-    set_before = {
-        f"  {key}:": limit for key in _OF_THE_RIG if (limit := getattr(old.limits, key)) is not None
-    }
-    yield from (line for line in lines if not line.startswith(tuple(set_before)))
-    for key, limit in set_before.items():
-        yield f"{key} {{max: {limit.max:g}, at: {limit.at}}}"
-
-
-_OF_THE_RIG = (
-    "force_rate_N_per_s",
-    "displacement_rate_mm_per_s",
-    "joint_deviation_deg",
-    "joint_temperature_C",
-)
+    yield from limit_lines(top, _LASER_MM, limits_before([dataset]))
+    if old is not None and (words := old.prompts.get("before_run")):
+        yield f"\nprompts: {{before_run: {json.dumps(words)}}}"
 
 
 def _sense(design: Design, direction: str) -> float:
@@ -238,19 +204,31 @@ def _poses(design: Design, meta: Meta) -> Iterator[str]:
         yield pose_line(name, known[name], tcp[name])
 
 
-def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
+def _timing(
+    design: Design, old: MeasurementProtocol | None, present: Design | None
+) -> Iterator[str]:
+    """Times of the design; those of the old protocol, where the design has what was measured
+    (present): slots that were late or missed make other ones of them."""
     rate = _rate_Hz(design, old)
     band = _force_band(design)
     samples = max(1, min(5, round(design.hold_s * rate)))
     hold = design.hold_s if design.hold_s * rate > samples else 0.0
     zero = max(design.zero_s, 6.0, 1 / rate)
+    before, after, rest = zero, zero, min(design.rest_s, 3600)
+    if old is not None and present is not None:
+        if design.hold_s == present.hold_s:
+            samples, hold = old.sampling.samples_per_step, old.hold_s
+        if design.zero_s == present.zero_s:
+            before, after = old.zero.before_s, old.zero.after_s
+        if design.rest_s == present.rest_s:
+            rest = old.rest_s
     yield f"\nsampling: {{rate_Hz: {rate:g}, samples_per_step: {samples}}}"
     yield f"hold_s: {_seconds(hold)}"
     yield f"force_band: {{absolute_N: {band.absolute_N:.3g}, relative: {band.relative:.3g}}}"
     yield from settle_lines(old.settle) if old else settle_lines()
     yield f"step_deadline_s: {old.step_deadline_s if old else 300:g}"
-    yield f"zero: {{before_s: {_seconds(zero)}, after_s: {_seconds(zero)}}}"
-    yield f"rest_s: {_seconds(min(design.rest_s, 3600))}"
+    yield f"zero: {{before_s: {_seconds(before)}, after_s: {_seconds(after)}}}"
+    yield f"rest_s: {_seconds(rest)}"
     yield "rated_load_N: null"
 
 

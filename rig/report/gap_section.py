@@ -167,18 +167,18 @@ def _how_far(found: Node) -> Table:
             told = h["ci95"][0].value < h["ci95"][1].value
             low, high = (h["ci95"][i].number(3) if told else no for i in (0, 1))
             rows.append(row(f"withheld: {h['fold'].text()}", *_sizes(h), low, high))
-    rows.append(row("noise of the instruments", no, noise, no, no, no))
+    rows.append(row("noise of the instruments", no, noise, no, no, no, no))
     for word, r in found.get("runners_up").items():
         after = r["held_out_after_rms_mm"].number()
-        rows.append(row(f"withheld, with {word} instead", no, after, no, no, no))
-    header = ("", "before mm", "after mm", "shrinks by", "95 % from", "to")
+        rows.append(row(f"withheld, with {word} alone", no, after, no, no, no, no))
+    header = ("", "before mm", "after mm", "after/noise", "shrinks by", "95 % from", "to")
     told = less_datum(h["fold"].text() for h in folds if h and h["own_datum"].value)
     return Table(f"How far the gap shrinks (rms{'; ' * bool(told)}{told})", header, tuple(rows))
 
 
-def _sizes(node: Node) -> tuple[Rich, Rich, Rich]:
+def _sizes(node: Node) -> tuple[Rich, Rich, Rich, Rich]:
     before, after = node["before_rms_mm"].number(), node["after_rms_mm"].number()
-    return before, after, node["shrink_factor"].number(3)
+    return before, after, node["after_over_noise"].number(3), node["shrink_factor"].number(3)
 
 
 def _next(found: Node) -> list[Block]:

@@ -31,7 +31,10 @@ def pulled(engine: Engine, name: str, fitted: Fit | None = None) -> Fit:
     fitted = fitted or fit(engine, nothing())
     pulls = np.zeros(len(fitted.pulls))
     pulls[engine.base.index(name)[0]] = FAR
-    return replace(fitted, pulls=pulls, base=pulls[: len(fitted.base)] * engine.base.sd)
+    base = pulls[: len(fitted.base)] * engine.base.sd
+    springs = engine.base.index("spring")
+    base[springs] = 1 / (1 + base[springs]) - 1  # the stiffness is what is stated
+    return replace(fitted, pulls=pulls, base=base)
 
 
 def test_pulls_are_coefficients_in_units_of_their_priors() -> None:

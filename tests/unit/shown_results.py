@@ -96,7 +96,7 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
     unseen = dict.fromkeys(("engine", "fit", "found"), NOWHERE)
     noise = SimpleNamespace(misjudged=False)
     arm: Any = SimpleNamespace(
-        data=SimpleNamespace(arm=True, curves=None), still=False, noise=noise
+        data=SimpleNamespace(arm=True, curves=None), still=False, noise=noise, imposed=False
     )
     return GapResult(verdict=verdict, probabilities=probabilities, bench=arm, **known, **unseen)
 
@@ -175,7 +175,8 @@ def without_gap() -> Diagnosis:
 
 def without_arm(found: Diagnosis) -> Diagnosis:
     """The same of a rig without an arm."""
-    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False, curves=None), still=False)
+    data = SimpleNamespace(arm=False, curves=None)
+    bench: Any = SimpleNamespace(data=data, still=False, imposed=False)
     return replace(found, result=replace(found.result, bench=bench))
 
 

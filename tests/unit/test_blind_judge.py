@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rig.blind import text
+from rig.blind import targets, text
 from rig.blind.campaign import Campaign, Outcome, Plan
 from rig.blind.diagnosers import Reply
 from rig.blind.judge import direction_right, encoders_right, intervals, joint_right, judge, matched
@@ -248,14 +248,20 @@ def test_tables_by_hand() -> None:
     assert t["confusion"]["none"] == {"none": 1, "joint_yield": 1}
 
 
-def test_text_says_that_it_is_simulated_and_how_to_repeat_it() -> None:
+def test_text_says_that_it_is_simulated_and_how_to_repeat_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     out = text.terminal(report(campaign()))
     assert out.startswith("SIMULATED: every measurement below was drawn by a computer")
     assert "rig blind --cases 9 --seed 3" in out
     assert "4 of 8 verdicts are right" in out
     assert "c7: crashed, oh" in out
     (line,) = [x for x in out.splitlines() if x.strip().startswith("one effect: right  ")]
-    assert " ".join(line.split()) == "one effect: right 0.25 0.05 to 0.70 1 of 4 >= 0.95 no"
+    assert " ".join(line.split()) == "one effect: right 0.25 0.05 to 0.70 1 of 4 >= 0.95"
+    monkeypatch.setattr(targets, "_FEW", 4)  # of fewer cases nobody can say
+    out = text.terminal(report(campaign()))
+    (line,) = [x for x in out.splitlines() if x.strip().startswith("one effect: right  ")]
+    assert line.endswith(" no")
 
 
 def test_markdown_tables_are_rectangular() -> None:

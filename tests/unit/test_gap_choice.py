@@ -7,14 +7,22 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 
-from identification.gap.answer.notes import called, left_out
+from identification.gap.answer.found_notes import called, left_out
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.verdict import TAKES_TWO, simpler_of
-from identification.gap.judging.choice import WORTH, WORTH_OF_THIRD, chosen_of, foresees
+from identification.gap.judging import choice as choosing
+from identification.gap.judging.choice import (
+    SHOWN_WITHOUT_LOAD,
+    WORTH,
+    WORTH_OF_THIRD,
+    chosen_of,
+    foresees,
+)
 from identification.gap.model.variants import variant
 from tests.unit.small_explanations import part
 
@@ -119,7 +127,7 @@ def test_what_brings_too_little_to_lead_is_not_shown_as_the_largest(
     sizes = {largest: 1.3, **{w: 1.0 for w in (CURVE, LAG) if w != largest}, ASKEW: 0.6}
     choice = chosen_of(found(two, said(sizes, worth)), CURVE)
     assert len(choice.shown.words) == named
-    assert [n.text.count("few nats") for n in left_out(*choice)] == [1] * (named == 2)
+    assert [n.text.count("few nats") for n in left_out(*choice, 1.0)] == [1] * (named == 2)
 
 
 def test_springs_far_off_speak_for_no_pair() -> None:
@@ -170,18 +178,40 @@ def test_of_two_small_ones_the_smaller_goes_first(size: float, named: set[str]) 
 
 def test_what_does_too_little_to_be_named_is_told() -> None:
     one, two = said({CURVE: 1.0}, 0.0), said({CURVE: 1.0, LAG: 0.1}, 400.0)
-    (note,) = left_out(*chosen_of(found(one, two), CURVE))
+    (note,) = left_out(*chosen_of(found(one, two), CURVE), 1.0)
     assert "time_lag (0.001 mm rms)" in note.text
     assert "400 nats more" in note.text
     assert "--add time_lag." in note.text
-    assert not left_out(two, two)  # it was asked for
+    assert "most of" not in note.text
+    (most,) = left_out(one, two, 1.5 * two.troubles[LAG])
+    assert "400 nats more, most of the 0.0015 mm that are left. " in most.text
+    assert not left_out(two, two, 1.0)  # it was asked for
     large = said({CURVE: 1.0, LAG: 0.9}, 400.0)
-    assert not left_out(*chosen_of(found(one, large), CURVE))
+    assert not left_out(*chosen_of(found(one, large), CURVE), 1.0)
     # what is left out for another reason is no matter of its size
     refused = replace(found(one, large), kept={large.words: 0.1, one.words: 1.0})
-    assert not left_out(*chosen_of(refused, CURVE))
+    assert not left_out(*chosen_of(refused, CURVE), 1.0)
     little = said({CURVE: 1.0, LAG: 0.9}, WORTH - 1)
-    assert not left_out(*chosen_of(found(one, little), CURVE))
+    assert not left_out(*chosen_of(found(one, little), CURVE), 1.0)
+
+
+@pytest.mark.parametrize(("missed", "named"), [(SHOWN_WITHOUT_LOAD - 1, 1), (20.0, 2)])
+def test_a_little_drift_is_named_where_the_force_without_load_shows_it(
+    monkeypatch: pytest.MonkeyPatch, missed: float, named: int
+) -> None:
+    """No law of what is loaded could be off there."""
+    drift = "force_drift"
+    one, two = said({CURVE: 1.0}, 0.0), said({CURVE: 1.0, drift: 0.01}, 400.0)
+    other = said({CURVE: 1.0, LAG: 0.01}, 300.0)
+    zeros = np.array([missed, -missed])
+    fitted = SimpleNamespace(missed_zeros=lambda _: zeros)
+    monkeypatch.setattr(choosing, "fit", lambda *_: fitted)
+    assert len(shown_of(found(one, two), CURVE).words) == named
+    assert len(shown_of(found(one, other), CURVE).words) == 1
+    three = said({CURVE: 1.0, drift: 0.01, LAG: 0.01}, 900.0)
+    assert len(shown_of(found(one, two, three), CURVE).words) == named
+    zeros = np.zeros(0)  # where it is no channel
+    assert len(shown_of(found(one, two), CURVE).words) == 1
 
 
 def test_a_smaller_verdict_of_a_play_and_a_curve_is_told_why() -> None:

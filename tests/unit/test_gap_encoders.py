@@ -178,8 +178,8 @@ def test_what_setups_are_off_by_is_no_effect_where_few_readings_without_load_sho
     kept = np.union1d(np.flatnonzero(data.branch != ZERO), once)
     names = ("time", "run", "setup", "repetition", "branch", "step", "force", "displacement")
     assert data.q is not None
-    thin = replace(data, **{n: getattr(data, n)[kept] for n in names}, session=None)
-    thin = replace(thin, q=data.q[kept], tangential=None, temperature=None)
+    few_zeros = {n: getattr(data, n)[kept] for n in names}
+    thin = replace(data, **few_zeros, q=data.q[kept], session=None, tangential=None)
     found = explained(off(thin, setup=1.2e-5, seed=seed))
     assert found.verdict == "none"
     assert found.probabilities["none"] > 0.8

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.answer.notes import readings_missed
+from identification.gap.answer.found_notes import readings_missed
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit

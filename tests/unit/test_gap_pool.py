@@ -9,7 +9,7 @@ from weakref import ref
 import numpy as np
 import pytest
 
-from identification.gap.answer.discriminate import _BESIDES, _DECISIVE, ENOUGH, Option, _settled
+from identification.gap.answer.discriminate import _BESIDES, _HALF, ENOUGH, Option, _settled
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence import compare
@@ -88,7 +88,7 @@ def test_a_slip_at_another_depth_is_the_same_shape_where_moments_run_in_proporti
 
 
 def test_procedures_that_take_too_long_to_be_worth_more_are_left_out() -> None:
-    quick = Option("steps", "", 2 * _DECISIVE, 10.0)
+    quick = Option("steps", "", 1000 * _HALF, 10.0)
     some = [Option(f"{i}", "", ENOUGH + 1, 20.0) for i in range(_BESIDES)]
     assert _settled([quick, *some], 10.5)
     assert not _settled([quick, *some], 9.5)  # would be worth more, if it decides

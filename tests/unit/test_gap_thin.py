@@ -10,8 +10,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from identification.gap.answer import notes
-from identification.gap.answer.notes import disbelieved
+from identification.gap.answer import found_notes
+from identification.gap.answer.found_notes import disbelieved
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.model.bench import make_bench
@@ -138,7 +138,7 @@ def test_what_asks_for_too_much_without_any_effect_is_told_so(
 ) -> None:
     engine = quick_engine(make_bench(linear("rich")))
     asks = "the stiffness of a joint 7 standard deviations off what META states"
-    monkeypatch.setattr(notes, "what_is_strained", lambda *_: asks)
+    monkeypatch.setattr(found_notes, "what_is_strained", lambda *_: asks)
     nothing = Explanation((), 0.0, 0.0, (), 0.0)
     found = cast("SearchResult", SimpleNamespace(engine=engine, explanations=(nothing,)))
     (note,) = disbelieved(found, "unknown")

@@ -10,13 +10,17 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
+import numpy as np
 import pytest
 
 from identification.gap.answer.notes import KINDS, Note, ordered
 from identification.gap.explanations.explanation import Likeness
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
+from identification.gap.model.bench import Bench
 from rig import cli
 from rig.blind import text
 from rig.blind.score import report
@@ -96,6 +100,52 @@ def test_an_interval_that_nothing_tells_is_not_shown() -> None:
     lines = diagnose_text._gap(found).splitlines()
     assert lines[2].split()[-1] == "-"  # nothing is left
     assert lines[3].endswith("17.2")
+
+
+def test_what_nothing_was_withheld_of_is_no_row() -> None:
+    still = HeldOut("block", 0.0, 0.0, (1.0, 1.0))
+    found = replace(shown.without_gap().result, held_out=(still,))
+    assert "withheld" not in diagnose_text._gap(found)
+
+
+def test_a_place_without_any_force_is_none() -> None:
+    found = shown.explained().result
+    still = dict.fromkeys(found.where.force, (0.0, 0.0))
+    assert diagnose_text._where(replace(found, where=replace(found.where, force=still))) == ""
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "value", "probability", "said"),
+    [
+        (-0.5, 2.0, 1.0, 0.99, ["surer that it is there"]),
+        (-0.5, 2.0, 1.0, 0.9, []),
+        (0.5, 2.0, 1.0, 0.99, []),
+        (0.0, 2.0, 0.0, 0.99, ["at the limit of what is possible", "surer that it is there"]),
+        (0.5, 2.0, 2.0, 0.99, ["at the limit of what is possible"]),
+        (1.0, 1.0, 1.0, 0.99, []),  # known to the last digit
+    ],
+)
+def test_what_an_interval_leaves_open_is_said(
+    low: float, high: float, value: float, probability: float, said: list[str]
+) -> None:
+    effect = shown.explained().result.effects[1]
+    found = replace(
+        effect, probability=probability, parameters={"rate": Parameter(value, low, high, "N/s")}
+    )
+    text = "\n".join(diagnose_text._one_effect(found, found.name))
+    sayings = ("at the limit of what is possible", "surer that it is there")
+    assert [s for s in sayings if s in text] == said
+
+
+def test_a_gap_of_force_is_told_in_newtons() -> None:
+    rig = SimpleNamespace(arm=False, joints=1, compliance=np.array([1 / 3e7]))
+    bench = cast(Bench, SimpleNamespace(imposed=True, data=rig))
+    told = "the gap is one of force, over the simulated stiffness: 1 mm is 30000 N"
+    assert diagnose_text.in_newtons(bench) == told
+    rig.joints, rig.compliance, rig.spring_name = 2, np.array([1e-6, 1e-7]), "xy".__getitem__
+    assert diagnose_text.in_newtons(bench).endswith("1 mm is 1000 N along x, 10000 N along y")
+    assert shown.explained().result.bench.imposed is False
+    assert diagnose_text.in_newtons(shown.explained().result.bench) == ""
 
 
 def test_notes_stand_under_what_they_are_what_is_wrong_right_after_the_answer() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,14 +12,17 @@ import pytest
 
 from identification.gap.answer.designs import Design
 from identification.gap.data import Instruments
+from rig import protocol_before
 from rig.diagnosis.next_protocol import (
     _apart,
-    _as_watched,
     _force_band,
     _rate_Hz,
     _seconds,
     _seen_to_the_end,
+    _timing,
 )
+from rig.protocol import load_protocol
+from rig.protocol_before import limits_before
 from rig.protocol_write import limit_lines, pose_line
 from rig.protocolfile import Limit, Limits
 
@@ -43,27 +47,70 @@ def test_slots_that_were_late_do_not_make_another_rate(measured_s: float, rate_H
     ("allowed_N", "written"), [(None, 258), (240.0, 240), (300.0, 258), (221.0, 258)]
 )
 def test_a_limit_is_not_raised_without_need(allowed_N: float | None, written: int) -> None:
-    before = {} if allowed_N is None else {"most_N": allowed_N}
-    assert f"  force_N: {{max: {written}, at: stop}}" in limit_lines(220.0, "9", **before)
+    before = Limits() if allowed_N is None else Limits(force_N=Limit(max=allowed_N, at="pause"))
+    at = "stop" if allowed_N is None else "pause"
+    assert f"  force_N: {{max: {written}, at: {at}}}" in limit_lines(220.0, 9.0, before)
 
 
 def test_what_was_watched_before_is_watched_no_less() -> None:
-    set_before = Limits(
+    before = Limits(
         joint_deviation_deg=Limit(max=3.0, at="stop"),
         force_rate_N_per_s=Limit(max=60.0, at="stop"),
         displacement_rate_mm_per_s=Limit(max=2.0, at="stop"),
+        displacement_mm=Limit(max=7.5, at="pause"),
     )
-    old: Any = SimpleNamespace(limits=set_before)
-    rate = "  displacement_rate_mm_per_s: {max: 3, at: warn}"
-    assert list(_as_watched(limit_lines(220.0, "9", rate), old)) == [
+    assert limit_lines(220.0, 9.0, before) == [
         "limits:",
         "  force_N: {max: 258, at: stop}",
-        "  displacement_mm: {max: 9, at: stop}",
-        "  joint_temperature_C: {max: 60, at: stop}",
+        "  displacement_mm: {max: 7.5, at: pause}",
         "  force_rate_N_per_s: {max: 60, at: stop}",
         "  displacement_rate_mm_per_s: {max: 2, at: stop}",
         "  joint_deviation_deg: {max: 3, at: stop}",
+        "  joint_temperature_C: {max: 60, at: stop}",
     ]
+
+
+def test_of_several_data_sets_the_least_that_was_allowed_counts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    each = [
+        SimpleNamespace(limits=Limits(force_N=Limit(max=200.0, at="warn"))),
+        None,  # an imported table
+        SimpleNamespace(
+            limits=Limits(
+                force_N=Limit(max=250.0, at="stop"), joint_temperature_C=Limit(max=50.0, at="warn")
+            )
+        ),
+    ]
+    monkeypatch.setattr(protocol_before, "protocol_before", lambda k: each[k])
+    assert limits_before(range(3)) == Limits(  # type: ignore[arg-type]
+        force_N=Limit(max=200.0, at="stop"), joint_temperature_C=Limit(max=50.0, at="warn")
+    )
+
+
+@pytest.mark.parametrize("longer", ["", "hold_s", "zero_s", "rest_s"])
+def test_times_that_a_proposal_leaves_are_those_of_the_protocol(longer: str) -> None:
+    """Three of five slots that were missed make other holds and pauses in the data."""
+    present = replace(planned((10.0, 20.0)), hold_s=12.0, sample_s=2.4, zero_s=13.0, rest_s=41.0)
+    design = replace(present, **({longer: 90.0} if longer else {}))
+    old: Any = SimpleNamespace(
+        sampling=SimpleNamespace(rate_Hz=1.0, samples_per_step=5),
+        hold_s=0.0,
+        zero=SimpleNamespace(before_s=6.0, after_s=7.0),
+        rest_s=10.0,
+        settle=load_protocol(Path("protocols/paper_xy.yaml")).settle,
+        step_deadline_s=300.0,
+    )
+    lines = list(_timing(design, old, present))
+    kept = {
+        "hold_s": ["hold_s: 0"],
+        "zero_s": ["zero: {before_s: 6, after_s: 7}"],
+        "rest_s": ["rest_s: 10"],
+    }
+    for name, written in kept.items():
+        assert all((line in lines) is (name != longer) for line in written)
+    if longer:
+        assert any("90" in line for line in lines)
 
 
 def planned(*levels: tuple[float, ...]) -> Design:

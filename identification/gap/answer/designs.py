@@ -323,11 +323,20 @@ def _calibrated(design: Design, arm: bool) -> Iterator[Candidate]:
     force, displacement, rig = (
         ("dynamometer", "laser", "arm") if arm else ("force sensor", "displacement sensor", "rig")
     )
-    if meter.force_gain > _WEIGHT_GAIN or meter.displacement_gain > _GAUGE_GAIN:
+    better = [
+        f"{check} ({100 * known:g} %; META states {100 * stated:.2g} %)"
+        for check, known, stated in (
+            (f"a known weight on the {force}", _WEIGHT_GAIN, meter.force_gain),
+            (f"a gauge block under the {displacement}", _GAUGE_GAIN, meter.displacement_gain),
+        )
+        if stated > known
+    ]
+    if better:
+        gains = "gains" if len(better) > 1 else "gain"
         yield Candidate(
             "calibrate",
-            f"Check the gains before measuring again: a known weight on the {force} (1 %), a "
-            f"gauge block under the {displacement} (0.2 %); what then remains is the {rig}'s.",
+            f"Check the {gains} before measuring again: {', '.join(better)}, and put what you find "
+            f"into META; what then remains is the {rig}'s.",
             replace(
                 design,
                 instruments=replace(

@@ -3,7 +3,8 @@
 For every procedure that could follow the present one, both explanations' fitted forms are simulated
 along its path and judged there as a measurement would be: the log odds that the right one would win
 by. The smaller of the two (either may be the true one), beyond what repeating the present procedure
-gives, per minute of measuring, decides.
+gives, per minute of measuring, decides; little may turn out to be nothing on a rig whose laws are
+not quite these.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from identification.gap.model.variants import Variant
 
 ENOUGH = 3.0  # nats: odds of 20 to 1
 _LITTLE = 0.5  # nats below which no procedure is better than any other
-_DECISIVE = 10.0  # more certainty than this is worth no further minute
+_HALF = 30.0  # nats of which half may come to nothing: laws of a rig are not those that were fitted
 _BESIDES = 2  # further procedures that would do, for who can't do the best
 _REPETITIONS = 2  # simulated
 _GAINS = {"force_scale": "force_gain", "displacement_scale": "displacement_gain"}
@@ -60,7 +61,8 @@ class NextMeasurement:
     """What to do, which two words it separates, what it is expected to give, and the other
     options, best first. kind "none": nothing that was tried reaches ENOUGH; design is None then.
     reached: m, of every setup of the design how far loading to each level goes at the most, by
-    either explanation; empty without an arm."""
+    either explanation; empty without an arm. present: the procedure that the design came from, as
+    nearly as the data tell."""
 
     text: str
     separates: tuple[str, str]
@@ -70,6 +72,7 @@ class NextMeasurement:
     alternatives: tuple[Option, ...] = ()
     design: Design | None = None
     reached: tuple[tuple[float, ...], ...] = ()
+    present: Design | None = None
 
 
 Others = Callable[[], Sequence[Elsewhere]]
@@ -112,21 +115,24 @@ def next_measurement(
     proposal = _proposal(rated, pair)
     if proposal is None or proposal.design is None or not engine.bench.data.arm:
         return proposal
-    return replace(proposal, reached=_reached(engine.bench, proposal.design, (first, second)))
+    reached = _reached(engine.bench, proposal.design, (first, second))
+    return replace(proposal, reached=reached, present=design)
 
 
 def _settled(options: list[Option], minutes: float) -> bool:
     """Whether nothing that takes so long can be worth more than what was looked at, of which a few
     would do besides."""
     do = sorted((_worth(o) for o in options if o.expected_nats >= ENOUGH), reverse=True)
-    return len(do) > _BESIDES and do[0] > _DECISIVE / max(minutes, 1e-9)
+    return len(do) > _BESIDES and do[0] > 1 / max(minutes, 1e-9)
 
 
 def _worth(option: Option) -> float:
-    """What reaches enough comes first, by certainty per minute; then whatever gives most."""
-    if option.expected_nats < ENOUGH:
-        return option.expected_nats * 1e-6
-    return min(option.expected_nats, _DECISIVE) / max(option.minutes, 1e-9)
+    """What reaches enough comes first, by the chance that it tells per minute; then whatever gives
+    most."""
+    nats = option.expected_nats
+    if nats < ENOUGH:
+        return nats * 1e-6
+    return nats / (nats + _HALF) / max(option.minutes, 1e-9)
 
 
 def _proposal(

@@ -10,21 +10,21 @@ import numpy as np
 
 from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement
-from identification.gap.answer.gear_side import read_elsewhere
-from identification.gap.answer.locate import Where, locate
-from identification.gap.answer.notes import (
-    FAULT,
-    Note,
+from identification.gap.answer.found_notes import (
     across,
+    at_few_readings,
     called,
     disbelieved,
     left_out,
-    notes_of,
-    ordered,
+    not_foretold,
     readings_missed,
     springs_far_off,
 )
+from identification.gap.answer.gear_side import read_elsewhere
+from identification.gap.answer.locate import Where, locate
+from identification.gap.answer.notes import FAULT, Note, notes_of, ordered
 from identification.gap.answer.posterior import Known
+from identification.gap.answer.same_force import same_force
 from identification.gap.answer.scale import off_scale
 from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData
@@ -137,12 +137,15 @@ def result_of(
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
     structural = engine.target[:n] - springs.response
     simulated = stated_prediction(engine)
-    contradicted = (*off_scale(bench, simulated), *read_elsewhere(bench))
+    contradicted = (*off_scale(bench, simulated), *read_elsewhere(bench), *same_force(bench))
     notes = [*contradicted, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
     notes += springs_far_off(engine, fitted) if verdict == "none" else ()
-    notes += [*called(found, chosen, verdict), *left_out(chosen, fuller)]
+    after = left_of(engine, fitted)
+    notes += [*called(found, chosen, verdict), *left_out(chosen, fuller, after)]
+    notes += not_foretold(held, chosen.words)
+    notes += at_few_readings(engine, fitted, after) if chosen.parts else ()
     result = GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
@@ -150,7 +153,7 @@ def result_of(
         where=locate(engine, verdict, fitted, chosen.sizes, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, simulated),
-        after=left_of(engine, fitted),
+        after=after,
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,

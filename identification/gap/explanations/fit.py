@@ -79,11 +79,28 @@ class Fit:
         """(m, holds) rad by which it misses the joint readings, and (m, holds) rad their noise; of
         no holds without readings."""
         bench, q = engine.bench, engine.bench.layout.q
-        columns = engine.columns(c for p in self.parts for c in p.variant.columns)
-        gives = engine.base.columns @ self.base + columns @ self.coefficients
-        missed = (engine.target - gives)[q].reshape(bench.data.joints, -1)
+        missed = self._missed(engine)[q].reshape(bench.data.joints, -1)
         noise = engine.sigma[q].reshape(missed.shape)
         return missed, np.hypot(noise, bench.noise.q_run)
+
+    def missed_responses(self, engine: Engine) -> Array:
+        """(n,) by how many standard deviations it misses the response, of noise of rows and of what
+        holds and runs have in common."""
+        noise, n = engine.bench.noise, engine.bench.rows.n
+        sd = np.sqrt(engine.sigma[:n] ** 2 + noise.hold**2 + noise.run**2)
+        return np.asarray(self._missed(engine)[:n] / sd)
+
+    def missed_zeros(self, engine: Engine) -> Array:
+        """(z,) by how many standard deviations it misses the force that was read without load; of
+        none where that is no channel."""
+        zero = engine.bench.layout.zero_force
+        return np.asarray((self._missed(engine) / engine.sigma)[zero])
+
+    def _missed(self, engine: Engine) -> Array:
+        """(size,) of all channels, what it leaves."""
+        columns = engine.columns(c for p in self.parts for c in p.variant.columns)
+        gives = engine.base.columns @ self.base + columns @ self.coefficients
+        return np.asarray(engine.target - gives)
 
     def together(self, engine: Engine, words: Collection[str]) -> Array:
         """(n,) m what the effects of these words do to the response."""

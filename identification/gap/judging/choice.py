@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
+from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.fit import fit
 from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.explanations.verdict import (
     AS_STATED,
@@ -31,6 +35,9 @@ LEAST_OF_THIRD = 0.2
 # sample: a curve that does a twentieth of what a yield does, in another direction, is no matter of
 # the yield's law.
 CLOSELY = 2.0
+# And a force that drifts is named where the force without load shows it, beyond so many standard
+# deviations (rms): there is no law there that could be off.
+SHOWN_WITHOUT_LOAD = 3.0
 _TWO = 2
 
 
@@ -54,7 +61,7 @@ def chosen_of(found: SearchResult, verdict: str) -> Choice:
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
     best = _worthwhile(best, simpler, arm=found.engine.bench.data.arm)
-    shown = _without_small(best, simpler, CLOSELY * found.engine.bench.noise.stated)
+    shown = _without_small(found.engine, best, simpler)
     shown = _as_it_speaks(found, shown, verdict)
     return Choice(shown, best if shown is not best else None)
 
@@ -71,17 +78,27 @@ def _as_it_speaks(found: SearchResult, shown: Explanation, verdict: str) -> Expl
     return fewer
 
 
-def _without_small(best: Explanation, simpler: list[Explanation], most: float) -> Explanation:
+def _without_small(engine: Engine, best: Explanation, simpler: list[Explanation]) -> Explanation:
     """Without the effects that do too little, the smallest first: what is little beside two may be
-    enough beside one. most: imperfection (m) that their leaving may need."""
+    enough beside one."""
+    most = CLOSELY * engine.bench.noise.stated  # imperfection (m) that their leaving may need
     close = [e for e in simpler if e.eta <= max(best.eta, most)]
     while True:
         small = _too_small(best)
         fewer = (e for w in small for e in close if e.words == best.words - {w})
-        without = next(fewer, None)
+        without = next((e for e in fewer if not _shown_without_load(engine, best, e)), None)
         if without is None:
             return best
         best = without
+
+
+def _shown_without_load(engine: Engine, best: Explanation, fewer: Explanation) -> bool:
+    """Whether what fewer effects lack is a drift of the force, and the force without load shows
+    it."""
+    if best.words - fewer.words != {"force_drift"}:
+        return False
+    missed = fit(engine, fewer).missed_zeros(engine)
+    return bool(missed.size) and float(np.sqrt(np.mean(missed**2))) > SHOWN_WITHOUT_LOAD
 
 
 def _too_small(explanation: Explanation) -> list[str]:

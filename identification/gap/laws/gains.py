@@ -9,10 +9,11 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws.curves import BENT_SLOPE, hinge
-from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter
+from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter, factors
 from identification.gap.laws.law import Law, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
+from identification.uncertainty import TWO_SIDED
 
 SCALES = (0.03, 0.08, 0.2)
 _BENCH_SCALE = 0.6  # excitations and ranges are set wrong on rigs without an arm
@@ -40,18 +41,31 @@ def straight_and_bent(
 
 
 def factor(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
-    """Read over true. The columns are shares of what was read, but for an imposed displacement.
-    Of a gain that bends or changes, the straight line of least squares; of one component's gain,
-    with its name."""
-    share = v.info.get("share")
-    more = BENT_SLOPE if share is None else 1 - 1.5 * share + 0.5 * share**3
-    g = found.linear(np.array([1.0, more])[: len(found.w)], "1")
-    ends = [
-        1 + off if bench.imposed else 1 / max(1 - off, LEAST_FACTOR)
-        for off in (g.value, g.low, g.high)
-    ]
+    """Read over true, which is known to a factor. The columns are shares of what was read, but for
+    an imposed displacement. Of a gain that bends or changes, the straight line of least squares; of
+    one component's gain, with its name."""
+    above = v.info.get("share")
+    more = BENT_SLOPE if above is None else 1 - 1.5 * above + 0.5 * above**3
+    share = np.array([1.0, more])[: len(found.w)]
+    off, sd = float(share @ found.w), _nats(bench, v, found, share)
+    whole = max(1 + off if bench.imposed else 1 - off, LEAST_FACTOR)
+    spread = float(np.exp(min(TWO_SIDED * sd, -np.log(LEAST_FACTOR))))
+    value = whole if bench.imposed else 1 / whole
     of = v.info.get("component")
-    return {f"factor_{of}" if of else "factor": Parameter(ends[0], ends[1], ends[2], "1")}
+    return {f"factor_{of}" if of else "factor": factors(value, spread, "1")}
+
+
+def _nats(bench: Bench, v: Variant, found: Coefficients, share: Array) -> float:
+    """Standard deviation of the logarithm of the factor that a share of the readings is too much,
+    which coefficients (k,) give. Of a response that is read wrongly, what is left is a share of
+    what was read, and so of the factor; but as far as springs are uncertain, the share moves in
+    proportion to what they carry."""
+    off, square = float(share @ found.w), max(float(share @ found.cov @ share), 0.0)
+    s, whole = found.softer, max(1 + off if bench.imposed else 1 - off, LEAST_FACTOR)
+    springs = sum(float(share @ s.cross[j]) ** 2 / s.variance[j] for j in s.value)
+    springs = min(springs, square)
+    of_rest = 1.0 if v.word == "displacement_scale" and not bench.imposed else whole
+    return float(np.sqrt(springs / whole**2 + (square - springs) / of_rest**2))
 
 
 def law_of_gain(v: Variant, of: str) -> tuple[Law, Array]:
