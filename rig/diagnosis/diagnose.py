@@ -257,6 +257,7 @@ def _gap(r: GapResult) -> dict[str, Any]:
         "after_rms_mm": r.after * MM_PER_M,
         "after_over_noise": over(r.after, r.noise),
         "shrink_factor": r.before / r.after if min(r.before, r.after) > 0 else 1.0,
+        **({} if r.written is None else {"written_after_rms_mm": r.written * MM_PER_M}),
         **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM_PER_M}),
         "held_out": held[0] if held else None,
         "held_out_other": held[1:],

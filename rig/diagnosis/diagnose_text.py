@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from identification.gap.laws.interval import Parameter
     from identification.gap.model.bench import Bench
 
+_MORE_WRITTEN = 1.1  # times what is left: then a model file says so by itself
 _MORE = 1.01  # times the rest that is not left by rounding
 
 # One line a word: what happens there.
@@ -331,6 +332,8 @@ def _gap(r: GapResult) -> str:
         "                           before     after after/noise  shrinks by",
         _row("fitted", r.before, r.after, r.noise),
     ]
+    if r.written is not None and r.effects and r.written > _MORE_WRITTEN * r.after:
+        lines.append(_row("in a model file", r.before, r.written, r.noise))
     if r.without_added is not None:
         lines.append(_row("without what was added", r.before, r.without_added, r.noise))
         if r.after > _MORE * r.without_added:

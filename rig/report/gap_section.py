@@ -162,6 +162,8 @@ def _how_far(found: Node) -> Table:
     folds = [sizes["held_out"], *sizes.get("held_out_other")]
     noise, no = sizes["noise_rms_mm"].number(), NOTHING
     rows = [row("fitted", *_sizes(sizes), no, no)]
+    if written := sizes.get("written_after_rms_mm"):
+        rows.append(row("in a model file", no, written.number(), no, no, no, no))
     for h in folds:
         if h:
             told = h["ci95"][0].value < h["ci95"][1].value

@@ -288,6 +288,26 @@ def test_a_session_s_drift_is_no_part_of_the_simulation_of_the_next(
     assert after.result.verdict == "none"
 
 
+def test_what_a_model_file_leaves_is_what_its_simulation_misses(
+    planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
+) -> None:
+    """Drifts of this session are fitted, and in no file."""
+    _, dataset, _ = planned
+    session = dataset.columns["session_s"].astype(float)
+    warm = dataset.columns["displacement_mm"] + 0.05 * session / session.max()
+    drifting = replace(dataset, columns={**dataset.columns, "displacement_mm": warm})
+    found = diagnose(drifting)
+    assert found.result.verdict == "thermal_drift"
+    write_model(found, drifting, tmp_path / "m.yaml")
+    before = diagnose(drifting, model=tmp_path / "m.yaml").result.before
+    written = found.result.written
+    assert written is not None
+    assert written == pytest.approx(before, rel=0.1)
+    assert written > 3 * found.result.after
+    assert "in a model file" in found.to_text()
+    assert found.to_json()["gap"]["written_after_rms_mm"] == pytest.approx(1e3 * before, rel=0.1)
+
+
 def test_what_has_no_model_file_is_refused(
     planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
 ) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement
+from identification.gap.answer.forms import describe, lasting, realise
 from identification.gap.answer.found_notes import (
     across,
     at_few_readings,
@@ -67,7 +68,8 @@ class GapResult:
     remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
     on average stands in `after`. looks_like: of an unknown gap, where that is plain. without_added:
     `after` without the words that were to be added; None where there were none, or the
-    explanation had them. said: what is to be known beside, by kind. gone: words of the simulation's
+    explanation had them. written: `after` without what no model file holds; None where none is
+    written. said: what is to be known beside, by kind. gone: words of the simulation's
     effects that are not in the data as it has them; all that is said is of the simulation without.
     """
 
@@ -89,6 +91,7 @@ class GapResult:
     fit: Fit
     found: SearchResult
     without_added: float | None = None
+    written: float | None = None
     gone: tuple[str, ...] = ()
 
     @property
@@ -164,8 +167,22 @@ def result_of(
         engine=engine,
         fit=fitted,
         found=found,
+        written=_as_written(engine, fitted) if verdict != "unknown" else None,
     )
     return replace(result, looks_like=None) if result.hidden else result
+
+
+def _as_written(engine: Engine, fitted: Fit) -> float | None:
+    """rms (m) that springs and effects alone leave which last: without tares, gains, the scatter of
+    runs, and what drifts or jumps in this session. The datum is the laser's."""
+    bench, base, n = engine.bench, engine.base, engine.bench.rows.n
+    if not bench.data.arm or bench.data.curves is not None:
+        return None
+    kept = [i for name in ("spring", "geometry", "datum", "known") for i in base.index(name)]
+    gives = bench.response - engine.target[:n] + base.columns[:n, kept] @ fitted.base[kept]
+    for i, part in enumerate(fitted.parts):
+        gives = gives + realise(bench, lasting(describe(bench, part, *fitted.of(i))))[:n]
+    return sample_rms(bench, gives)
 
 
 def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> Likeness | None:

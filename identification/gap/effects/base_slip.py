@@ -24,6 +24,7 @@ from identification.gap.laws.flows import Flow
 from identification.gap.laws.interval import Parameter
 from identification.gap.laws.knees import knee_at, knee_variants
 from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
+from identification.gap.laws.lasting import GIVES_LEAST
 from identification.gap.laws.law import Law, Laws
 from identification.gap.laws.thresholds import moved, of_knee, over
 from identification.gap.model.bench import Bench
@@ -50,6 +51,7 @@ SLIDES_M, ACROSS = 20.0, {"y": "x", "x": "y"}  # axis: the way it slides
 # lever of 0.75 m 0.5e-6 to 4e-4 rad/Nm. Said of the target, not of the moment: axes at several
 # depths whose moments run in proportion have the same knees then, and need not be told apart.
 _BEYOND = 0.75**2 / 1.5e5
+_LEAST = 0.05  # of that: a stand that gives way by less hardly does
 _SHORTEST = 0.02  # m: levers
 
 
@@ -107,7 +109,8 @@ def _about(
         return bench.add(bench.outside_column(natural * lever * state))
 
     load = lever * bench.true_load * (longest >= _SHORTEST)
-    return load, column, {"axis": axis, "depth_m": depth, "natural": natural}
+    info = {"axis": axis, "depth_m": depth, "natural": natural, GIVES_LEAST: _LEAST}
+    return load, column, info
 
 
 def _name(info: dict[str, Any]) -> str:

@@ -85,17 +85,25 @@ def closing_in(
     for share in closer if fresh else ():
         best: Variant | None = None
         for _ in range(_LOOKS if share > closer[-1] else 1):
-            found += scored_beside(engine, word.families, word.ranked, fresh)
+            found += scored(word, fresh)
             last, best = best, max(found, key=evidence).variant
             if best is last:
                 break
             fresh = refined(engine.bench, best, share)
         finer += fresh
     if to_the_last:
-        found += scored_beside(engine, word.families, word.ranked, fresh)
+        found += scored(word, fresh)
     best_of = max(map(evidence, found), default=0.0)
     far = {s.variant for s in found if s.log_evidence < best_of - _FAR}
     return [v for v in finer if v not in far]
+
+
+def scored(word: Word, family: list[Variant]) -> list[Scored]:
+    """Scores of some of its variants: beside the leading word, where it explains something there;
+    of a rival of that, which explains the same, alone."""
+    if not seen(word):
+        return score(word.engine, word.engine.levels, family)
+    return scored_beside(word.engine, word.families, word.ranked, family)
 
 
 def scored_beside(

@@ -11,7 +11,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.laws.flow_back import flowing_back, yielded_from
 from identification.gap.laws.hardened import hardened
-from identification.gap.laws.lasting import HARDENS, LEAST, SCALES
+from identification.gap.laws.lasting import GIVES_LEAST, HARDENS, LEAST, SCALES
 from identification.gap.laws.memories import LIKELY, fresh_of, memories
 from identification.gap.laws.specimens import softening
 from identification.gap.laws.walks import walking
@@ -139,7 +139,7 @@ def with_back(
                 root=block([root, _RETURNS * np.eye(len(more))]),
                 positive=np.repeat([1.0, 0.0], [k, n - k]),
                 prior=prior,
-                least=LEAST,
+                least=info.get(GIVES_LEAST, LEAST),
                 each=each,
                 within=within,
                 flows_back=bool(more),

@@ -17,7 +17,7 @@ from identification.gap.laws.closer import (
     estimate,
     evidence,
     places,
-    scored_beside,
+    scored,
     shows,
 )
 from identification.gap.laws.flows import Flow
@@ -108,7 +108,7 @@ def _elsewhere(word: Word, closer: list[Variant], between: Between | None) -> li
     able = [v for v in closer if "weight" not in v.info]
     if not able or len({place for _, place in others}) < 2:
         return []
-    found = sorted(scored_beside(word.engine, word.families, word.ranked, able), key=evidence)
+    found = sorted(scored(word, able), key=evidence)
     moved = []
     for v in (s.variant for s in found[-_ELSEWHERE:]):
         there = [

@@ -10,7 +10,8 @@ from identification.gap.model.variants import Variant, variant
 
 SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
 HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
-LEAST = 0.15  # of the elastic compliance: what bends less does not give way
+# Of the elastic compliance: what bends less does not give way, if its place says nothing else.
+LEAST, GIVES_LEAST = 0.15, "gives_least"
 
 
 def lasting(
@@ -30,5 +31,13 @@ def lasting(
     from."""
     exact = {**info, "flow_s": 0.0, "radius": radius, "centre": radius[0], "back": {}, "knee": knee}
     return variant(
-        word, label, columns, SCALES, root=root, prior=prior, least=LEAST, each=each, **exact
+        word,
+        label,
+        columns,
+        SCALES,
+        root=root,
+        prior=prior,
+        least=exact.get(GIVES_LEAST, LEAST),
+        each=each,
+        **exact,
     )
