@@ -26,6 +26,7 @@ from identification.gap.explanations.verdict import (
     _main,
     _tells_of_three,
     may_miss,
+    speaker_of,
     with_a_lead,
     with_posterior,
 )
@@ -307,3 +308,28 @@ def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, mos
     one = replace(found, engine=engine, explanations=(nothing,), unknown=-800.0, alone=alone)
     none = with_posterior(one, {}).probabilities["none"]
     assert none == pytest.approx(1.0 if arm else 1 - most + each)
+
+
+@pytest.mark.parametrize(("apart", "spoken_by"), [(3.0, "joint_hysteresis"), (9.0, "joint_yield")])
+def test_two_that_are_worth_too_little_may_stand_for_another_one(
+    apart: float, spoken_by: str
+) -> None:
+    """Friction and a slip for one yield, which explains more than friction does. On a rig without
+    an arm a word speaks for itself."""
+    bench = small_bench()
+    found = search(small_engine_of(bench), library(bench, ["joint_creep"]))
+    rubs, slips, gives = (part(w, [0]) for w in ("joint_hysteresis", "base_slip", "joint_yield"))
+    both = said((rubs, slips), (2e-5, 1.9e-5))
+    alone, other = said((rubs,), (3e-5,), -18.0), said((gives,), (3e-5,), apart - 18.0)
+    for arm in (True, False):
+        engine = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=arm)))
+        ranked = tuple(sorted((both, alone, other), key=lambda e: -e.log_weight))
+        fresh = replace(found, engine=engine, explanations=ranked, unknown=-800.0, alone={})
+        given = with_posterior(fresh, {}).probabilities
+        assert max(given, key=lambda w: given[w]) == (spoken_by if arm else "joint_hysteresis")
+        speaker = speaker_of(fresh, both, {})
+        assert (speaker is other) is (arm and spoken_by == "joint_yield")
+    failed = {frozenset({"joint_yield"}): 0.1}  # it does not foretell what was withheld
+    arm = replace(bench, data=replace(bench.data, arm=True))
+    on_arm = replace(fresh, engine=replace_bench(found.engine, arm))
+    assert speaker_of(on_arm, both, failed) is None

@@ -12,7 +12,7 @@ from identification.gap.answer.mixing import apart, mixture, stretched, wider
 from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
 from identification.gap.effects.base_slip import ACROSS, slides
-from identification.gap.evidence.compare import Scored, logsumexp, score
+from identification.gap.evidence.compare import Scored, likelier_there, logsumexp, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import IMPERFECTION, STEP, level_priors
 from identification.gap.evidence.parts import Part, energies, log_joints, part_sizes, signs_kept
@@ -252,7 +252,8 @@ def _open(engine: Engine, variants: Sequence[Variant], chosen: Explanation, inde
     out = []
     for shape, more in shapes:
         parts = (*chosen.parts[:index], shape, *chosen.parts[index + 1 :])
-        each = _levels(engine, replace(chosen, parts=parts), shape.variant.log_prior + more)
+        likely = shape.variant.log_prior + likelier_there(engine, shape.variant) + more
+        each = _levels(engine, replace(chosen, parts=parts), likely)
         level = max(range(len(each)), key=lambda i: each[i][1])
         charge = max(SAME_JOINT * _crowds(shape, rest), _petty(engine, parts, level))
         out += sorted(((e, weight - charge) for e, weight in each), key=lambda e: -e[1])

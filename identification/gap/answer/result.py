@@ -32,6 +32,7 @@ from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, Likeness, SearchResult
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.verdict import speaker_of
 from identification.gap.judging.earned import left_of, noise_of, sample_rms
 from identification.gap.judging.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.laws.interval import Parameter
@@ -229,7 +230,7 @@ def _effects(
 
 def _said(found: SearchResult, explanation: Explanation) -> frozenset[str]:
     """What speaks for it says that is there."""
-    speaker = found.speaker_for(explanation)
+    speaker = speaker_of(found, explanation, found.kept)
     return frozenset() if speaker is None else speaker.words
 
 

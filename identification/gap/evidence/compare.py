@@ -18,7 +18,7 @@ from identification.gap.evidence.products import squares_of
 from identification.gap.evidence.signs import Limits
 from identification.gap.evidence.table import EvidenceTable, Stack
 from identification.gap.model.variants import Variant
-from identification.gap.words import LINEAR
+from identification.gap.words import LINEAR, MECHANISMS
 
 
 class Scored(NamedTuple):
@@ -77,12 +77,19 @@ def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
             batches.append((places, [_stack(engine, tuple(f), k) for f in words.values()]))
         engine.arranged[variants] = _Arranged(
             np.array([number[v] for v in like], dtype=np.intp),
-            np.array([v.log_prior for v in variants]),
+            np.array([v.log_prior + likelier_there(engine, v) for v in variants]),
             np.log([len(v.scales) for v in number]),
             batches,
         )
     found: _Arranged = engine.arranged[variants]
     return found
+
+
+def likelier_there(engine: Engine, v: Variant) -> float:
+    """Nats by which a mechanism of one joint is likelier for being that joint's."""
+    if v.joint is None or v.word not in MECHANISMS:
+        return 0.0
+    return float(engine.bench.likelier_joints[v.joint])
 
 
 # Variants of nearby sizes are padded to the same: a few large batches take less time than many.

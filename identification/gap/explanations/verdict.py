@@ -65,10 +65,8 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
-        fewer = simpler_of(e, ranked, kept, arm=arm)
-        while fewer is not None and (still := simpler_of(fewer, ranked, kept, arm=arm)):
-            fewer = still
-        said = found.speaker_for(e) or found.speaker_for(fewer) or fewer or e
+        fewer = _simplest_of(e, ranked, kept, arm=arm)
+        said = speaker_of(found, e, kept) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         three = arm and _tells_of_three(said, ranked)
         many = (THREE_CLOSELY if closely else THREE) if three else 1.0
@@ -191,6 +189,52 @@ def simpler_of(
 
 
 _TWO, _MANY = 2, 3
+
+
+def speaker_of(
+    found: SearchResult, explanation: Explanation, kept: Mapping[frozenset[str], float]
+) -> Explanation | None:
+    """Who speaks for an explanation that is no simpler one of the same effects, if anybody does."""
+    arm, ranked = found.engine.bench.data.arm, found.explanations
+    fewer = _simplest_of(explanation, ranked, kept, arm=arm)
+    better = _better_alone(fewer, ranked, kept) if arm and fewer is not None else None
+    return found.speaker_for(explanation) or found.speaker_for(fewer) or better
+
+
+def _simplest_of(
+    explanation: Explanation,
+    ranked: Sequence[Explanation],
+    kept: Mapping[frozenset[str], float],
+    *,
+    arm: bool,
+) -> Explanation | None:
+    """As `simpler_of`, as often as that goes."""
+    fewer = simpler_of(explanation, ranked, kept, arm=arm)
+    while fewer is not None and (still := simpler_of(fewer, ranked, kept, arm=arm)):
+        fewer = still
+    return fewer
+
+
+def _better_alone(
+    fewer: Explanation, ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float]
+) -> Explanation | None:
+    """Another single effect, where what would speak for two is one that explains plainly less: two
+    that are worth too little together may stand for that one, and neither of them is it."""
+    if len(fewer.words) != 1:
+        return None
+    able = (
+        f
+        for f in ranked
+        if len(f.words) == 1
+        and f.log_weight > fewer.log_weight + _PLAINLY
+        and f.good
+        and not f.off >= ARM_AS_STATED
+        and foresaw(kept, f.words)
+    )
+    return next(able, None)
+
+
+_PLAINLY = 5.0  # nats
 # Standard deviations to which springs and gains are as stated, and beyond which those of an arm are
 # uncertain no more: of arms without a fault none was off by 3 in 107 cases of the blind check.
 AS_STATED, ARM_AS_STATED = 3.0, 4.0

@@ -352,6 +352,22 @@ class Bench:
         total = part.sum(axis=1).max() or 1.0
         return [j for j in range(self.data.joints) if part[:, j].max() > 0.01 * total]
 
+    @cached_property
+    def likelier_joints(self) -> Array:
+        """(m,) nats by which a mechanism of so much at the target is likelier in one joint than in
+        another: troubles are a share of what a joint gives, mostly of a few percent to about all of
+        it, so the same at the target is a likelier share of a joint that moves that far. Half a nat
+        for a factor e; 0 on average, of joints that hardly move, and of a rig without an arm."""
+        out, moving = np.zeros(self.data.joints), self.moving_joints()
+        if not self.data.arm or not moving:
+            return out
+        gives = np.abs(self.lever * self.elastic).max(axis=0)[moving] ** _OF_SHARE
+        out[moving] = np.log(gives / gives.mean())
+        return out
+
+
+_OF_SHARE = 0.5
+
 
 def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None = None) -> Bench:
     """The bench of a data set. compliance (m,): point about which springs are linearised."""
