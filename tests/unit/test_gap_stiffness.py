@@ -10,12 +10,13 @@ import pytest
 from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
-from identification.gap.evidence.stiffness import as_stiff_as_stated, log_ratio
+from identification.gap.evidence.stiffness import as_stiff_as_stated, log_ratio, stated_between
 from identification.gap.explanations.fit import fit
 from identification.gap.judging.strain import most_off
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import variant
+from identification.gap.search.search import _as_stated
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
 from tests.unit.small_explanations import said
@@ -100,6 +101,20 @@ def test_only_springs_of_an_arm_count_so(bench: Bench) -> None:
     ]
     assert ratios[0] > 1.0
     assert ratios[1] == 0.0
+
+
+def test_noise_beyond_what_is_stated_takes_no_spring_s_place(bench: Bench) -> None:
+    """Springs that are far off are as far off beside a little more noise: evidence of what was
+    stated is never more than where nothing is off."""
+    etas = np.array([0.0, 1e-6, 2e-6, 4e-6, 8e-6])
+    still, soft = (
+        _as_stated(Engine(bench, base_columns(bench), one_soft_spring(bench, softer), etas))
+        for softer in (0.0, 6.0)
+    )
+    assert soft < still - 20.0
+    engine = Engine(bench, base_columns(bench), one_soft_spring(bench, 0.4), etas)
+    at_a_level = engine.levels[1].log_base + as_stiff_as_stated(engine, (), 1)
+    assert stated_between(engine, float(etas[1])) == pytest.approx(at_a_level, abs=1e-6)
 
 
 def test_a_spring_is_off_by_its_stiffness(bench: Bench) -> None:

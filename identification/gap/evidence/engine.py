@@ -209,15 +209,21 @@ class Engine:
         """Posterior mean (m,) and covariance (m, m) of coefficients of the base, beside columns
         (k,) of the pool with the root (k, r) of their prior covariance, at a level."""
         base = self._bases[number]
-        turn = base.turn[:, list(which)]
+        mean, covariance = base.of(which)
         if not columns:
-            return turn.T @ base.left, turn.T @ turn
+            return mean, covariance
+        turn = base.turn[:, list(which)]
         inner = np.eye(root.shape[1]) + root.T @ self.square(tuple(columns))[number] @ root
         turned = np.linalg.solve(factor_of(inner), root.T)  # of the covariance beside the base
         w = turned.T @ (turned @ self.levels[number].moment[list(columns)])
         shared = base.pool.values[list(columns)]
         beside = turned @ shared @ turn
-        return turn.T @ (base.left - shared.T @ w), turn.T @ turn + beside.T @ beside
+        return mean - turn.T @ (shared.T @ w), covariance + beside.T @ beside
+
+    def of_base_between(self, which: Sequence[int], eta: float) -> tuple[Array, Array]:
+        """The same without effects, for an imperfection that is none of the levels."""
+        self.between(eta, ())
+        return self._finer[eta][1].of(which)
 
     def _of_mean(self) -> Array:
         """(m holds,) direction of the mean of a joint's readings in a run, of length 1."""
@@ -351,6 +357,11 @@ class _Integrated:
     log_base: float
     misfit: float
     pool: Growing
+
+    def of(self, which: Sequence[int]) -> tuple[Array, Array]:
+        """Posterior mean (m,) and covariance (m, m) of coefficients of the base alone."""
+        turn = self.turn[:, list(which)]
+        return turn.T @ self.left, turn.T @ turn
 
 
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:

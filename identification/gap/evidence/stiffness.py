@@ -19,7 +19,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.factor import factor_of
-from identification.gap.evidence.parts import Part
+from identification.gap.evidence.parts import Part, log_joint_between
 from identification.gap.model.variants import block
 
 _LEAST = 0.05  # of the stated stiffness: what is left at least
@@ -35,6 +35,16 @@ def as_stiff_as_stated(engine: Engine, parts: Sequence[Part], level: int) -> flo
     columns = [c for p in parts for c in p.variant.columns]
     mean, covariance = engine.of_base(springs, columns, block([p.root for p in parts]), level)
     return log_ratio(mean, covariance, engine.base.sd[springs])
+
+
+def stated_between(engine: Engine, eta: float) -> float:
+    """log evidence of springs as they are stated, for an imperfection (m) that is none of the
+    levels."""
+    springs = list(engine.base.springs.values())
+    evidence = log_joint_between(engine, (), eta)
+    if not engine.bench.data.arm or not springs:
+        return evidence
+    return evidence + log_ratio(*engine.of_base_between(springs, eta), engine.base.sd[springs])
 
 
 def log_ratio(mean: Array, covariance: Array, sd: Array) -> float:

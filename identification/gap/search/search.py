@@ -11,8 +11,8 @@ from identification.gap.evidence.compare import Scored, by_word, closest, log_me
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.finer import BELOW, PARTS, gained
 from identification.gap.evidence.imperfection import LOG_STEP
-from identification.gap.evidence.parts import Part, log_joint_between, part_sizes
-from identification.gap.evidence.stiffness import as_stiff_as_stated
+from identification.gap.evidence.parts import Part, part_sizes
+from identification.gap.evidence.stiffness import as_stiff_as_stated, stated_between
 from identification.gap.explanations.explanation import (
     Explanation,
     SearchResult,
@@ -59,8 +59,7 @@ def search(
     for word, scored in families.items():
         pool[frozenset([word])] = joined(engine, (), scored, 0.0)
     none = _as_stated(engine)
-    whole = none + as_stiff_as_stated(engine, (), 0) + LOG_NONE
-    empty = Explanation((), whole, 0.0, (), whole)
+    empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
     seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
     singly = _seeds(pool, seeds)
@@ -81,15 +80,19 @@ def search(
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
     ranked = measured(engine, ranked)
     named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
-    strange = [lv for lv in engine.levels if lv.eta > _hidden(engine)]
+    strange = {
+        lv.eta: lv.log_base + as_stiff_as_stated(engine, (), lv.number)
+        for lv in engine.levels
+        if lv.eta > _hidden(engine)
+    }
     found = SearchResult(
         engine=engine,
         explanations=named,
         nameless=tuple(e for e in ranked if e not in named),
         alone={w: v - none for w, v in alone.items() if w not in NAMELESS},
         probabilities={},
-        unknown=log_mean([lv.log_base for lv in strange]) + log_unknown(engine.bench.course),
-        unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
+        unknown=log_mean(list(strange.values())) + log_unknown(engine.bench.course),
+        unknown_eta=max(strange, key=lambda eta: strange[eta]),
         variants=tuple(all_of_them),
     )
     return with_posterior(found, {})
@@ -101,13 +104,12 @@ def _as_stated(engine: Engine) -> float:
     least, hidden = float(engine.etas[1]), _hidden(engine)
     above = np.floor(PARTS * np.log(max(hidden / least, 1.0)) / LOG_STEP)
     etas = least * np.exp(np.arange(-BELOW * PARTS, above + 1) / PARTS * LOG_STEP)
-    more = [log_joint_between(engine, (), float(eta)) for eta in etas]
+    more = [stated_between(engine, float(eta)) for eta in etas]
     less = float(
         np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0], [_SURE_SHARE, _UNSURE_SHARE])
     )
-    return log_mean(
-        [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
-    )
+    least = engine.levels[0].log_base + as_stiff_as_stated(engine, (), 0)
+    return log_mean([least, *more], [1 - less, *(less / len(more) for _ in more)])
 
 
 # What readings have in common with the next ones of their hold, they have with all of it, and more:
