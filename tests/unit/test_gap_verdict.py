@@ -310,7 +310,7 @@ def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, mos
     assert none == pytest.approx(1.0 if arm else 1 - most + each)
 
 
-@pytest.mark.parametrize(("apart", "spoken_by"), [(3.0, "joint_hysteresis"), (9.0, "joint_yield")])
+@pytest.mark.parametrize(("apart", "spoken_by"), [(-2.0, "joint_hysteresis"), (2.0, "joint_yield")])
 def test_two_that_are_worth_too_little_may_stand_for_another_one(
     apart: float, spoken_by: str
 ) -> None:
@@ -327,6 +327,9 @@ def test_two_that_are_worth_too_little_may_stand_for_another_one(
         fresh = replace(found, engine=engine, explanations=ranked, unknown=-800.0, alone={})
         given = with_posterior(fresh, {}).probabilities
         assert max(given, key=lambda w: given[w]) == (spoken_by if arm else "joint_hysteresis")
+        if arm:  # as likely as they are alone
+            odds = given["joint_yield"] / given["joint_hysteresis"]
+            assert np.log(odds) == pytest.approx(apart, abs=0.2)
         speaker = speaker_of(fresh, both, {})
         assert (speaker is other) is (arm and spoken_by == "joint_yield")
     failed = {frozenset({"joint_yield"}): 0.1}  # it does not foretell what was withheld

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -66,12 +66,11 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
         fewer = _simplest_of(e, ranked, kept, arm=arm)
-        said = speaker_of(found, e, kept) or fewer or e
+        said = found.speaker_for(e) or found.speaker_for(fewer) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         three = arm and _tells_of_three(said, ranked)
         many = (THREE_CLOSELY if closely else THREE) if three else 1.0
-        of = _of(e, fewer.words) if fewer is said else said
-        for word, share in _main(of, ranked, arm).items():
+        for word, share in _mains(e, fewer, said, ranked, kept, arm=arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
         heir = _heir(e, ranked, kept, may_miss(found.engine))
@@ -197,8 +196,11 @@ def speaker_of(
     """Who speaks for an explanation that is no simpler one of the same effects, if anybody does."""
     arm, ranked = found.engine.bench.data.arm, found.explanations
     fewer = _simplest_of(explanation, ranked, kept, arm=arm)
-    better = _better_alone(fewer, ranked, kept) if arm and fewer is not None else None
-    return found.speaker_for(explanation) or found.speaker_for(fewer) or better
+    speaker = found.speaker_for(explanation) or found.speaker_for(fewer)
+    if speaker is not None or not arm or fewer is None or len(fewer.words) > 1:
+        return speaker
+    first = next(iter(_alone(ranked, kept)), fewer)
+    return None if first is fewer else first
 
 
 def _simplest_of(
@@ -215,26 +217,39 @@ def _simplest_of(
     return fewer
 
 
-def _better_alone(
-    fewer: Explanation, ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float]
-) -> Explanation | None:
-    """Another single effect, where what would speak for two is one that explains plainly less: two
-    that are worth too little together may stand for that one, and neither of them is it."""
-    if len(fewer.words) != 1:
-        return None
-    able = (
-        f
-        for f in ranked
-        if len(f.words) == 1
-        and f.log_weight > fewer.log_weight + _PLAINLY
-        and f.good
-        and not f.off >= ARM_AS_STATED
-        and foresaw(kept, f.words)
-    )
-    return next(able, None)
+def _alone(
+    ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float]
+) -> Iterator[Explanation]:
+    """Single effects that explain enough, the likeliest first."""
+    for e in ranked:
+        if len(e.words) == 1 and e.good and not e.off >= ARM_AS_STATED and foresaw(kept, e.words):
+            yield e
 
 
-_PLAINLY = 5.0  # nats
+def _mains(
+    explanation: Explanation,
+    fewer: Explanation | None,
+    said: Explanation,
+    ranked: Sequence[Explanation],
+    kept: Mapping[frozenset[str], float],
+    *,
+    arm: bool,
+) -> dict[str, float]:
+    """Which effect is the main one, word -> probability; fewer, said: the simplest explanation of
+    the same effects, and the one that speaks. Two of an arm that are worth too little together may
+    be any single one, as likely as that is: a third one that both stand for as well as one of
+    them."""
+    if fewer is not said or not arm or len(fewer.words) > 1:
+        return _main(_of(explanation, fewer.words) if fewer is said else said, ranked, arm)
+    each = [(_main(e, ranked, arm), e.log_weight) for e in _alone(ranked, kept)]
+    weights = np.exp([weight - each[0][1] for _, weight in each])
+    out: dict[str, float] = {}
+    for (mains, _), share in zip(each, weights / weights.sum(), strict=True):
+        for word, p in mains.items():
+            out[word] = out.get(word, 0.0) + float(share) * p
+    return out
+
+
 # Standard deviations to which springs and gains are as stated, and beyond which those of an arm are
 # uncertain no more: of arms without a fault none was off by 3 in 107 cases of the blind check.
 AS_STATED, ARM_AS_STATED = 3.0, 4.0
