@@ -10,6 +10,7 @@ import pytest
 from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
+from identification.gap.evidence.stiffness import nats_of
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.judging.strain import LIMIT, strain, what_is_strained
@@ -33,7 +34,7 @@ def pulled(engine: Engine, name: str, fitted: Fit | None = None) -> Fit:
     pulls[engine.base.index(name)[0]] = FAR
     base = pulls[: len(fitted.base)] * engine.base.sd
     springs = engine.base.index("spring")
-    base[springs] = 1 / (1 + base[springs]) - 1  # the stiffness is what is stated
+    base[springs] = np.expm1(FAR * nats_of(engine.base.sd)[springs] * (pulls[springs] > 0))
     return replace(fitted, pulls=pulls, base=base)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.stiffness import nats_of
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.judging.leftover import ARM_AS_STATED, AS_STATED, FOR_NOTHING, looked_up
 from identification.gap.model.base import base_columns
@@ -30,7 +31,7 @@ def found_off(off: float, explanations: tuple[Explanation, ...]) -> SearchResult
     searched = search(small_engine_of(bench), library(bench, ["joint_creep"]))
     base = base_columns(bench)
     spring = base.names.index("spring1")
-    softer = 1 / (1 + off * base.sd[spring]) - 1
+    softer = np.exp(-off * nats_of(base.sd)[spring]) - 1
     target = softer * base.columns[:, spring]
     arm = replace(bench, data=replace(bench.data, arm=True))
     engine = Engine(arm, base, target, np.array([0.0, 3e-6]))

@@ -1,12 +1,13 @@
-"""Springs of an arm as they are stated: normal in the stiffness.
+"""Springs of an arm as they are stated: as likely so many times as stiff as so many times as soft.
 
 All else is linear in the compliances, and so are the columns of the springs; the evidence counts
-them as normal in the compliance, of the same relative size. That is the same for small changes, but
-half a stiffness that is known to a fifth is 2.5 standard deviations off, twice the compliance 5. So
+them as normal in the compliance. That is the same for small changes, but half a stiffness that is
+known to a fifth is 5 standard deviations then, and one and a half times as much 1.7. What is stated
+of a positive number is taken as lognormal, for stiffness and compliance alike: 3.5 and 2. So
 evidence is put right by the ratio of the two integrals over the springs alone, all else integrated
-out: the one exact, the other in the coordinates in which the stiffness is standard normal by
-Laplace's method (Tierney and Kadane, J. Am. Stat. Assoc. 81 (1986) 82-86), which is exact for
-springs that the data say nothing of.
+out: the one exact, the other in the logarithms of the springs by Laplace's method (Tierney and
+Kadane, J. Am. Stat. Assoc. 81 (1986) 82-86), which is exact for springs that the data say nothing
+of.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.parts import Part, log_joint_between
 from identification.gap.model.variants import block
 
-_LEAST = 0.05  # of the stated stiffness: what is left at least
+_LEAST = 0.05  # of the stated compliance, where the search begins
+_MOST = 10.0  # nats by which a spring may be off
 _TURNS, _THERE = 30, 1e-6  # steps at most; nats
 
 
@@ -48,21 +50,22 @@ def stated_between(engine: Engine, eta: float) -> float:
 
 
 def log_ratio(mean: Array, covariance: Array, sd: Array) -> float:
-    """log of the evidence under a prior that is normal in the stiffness, over that under one that
-    is normal in the compliance.
+    """log of the evidence under a prior that is lognormal, over that under one that is normal in
+    the compliance.
 
     mean (m,), covariance (m, m): posterior of relative changes of the compliance under the latter;
     sd (m,): relative, of both priors.
     """
     precision = np.asarray(np.linalg.inv(covariance / np.outer(sd, sd)))
     asked = precision @ (mean / sd)
-    springs = _Springs(sd, precision - np.eye(len(sd)), asked)
-    u = (1 / np.maximum(1 + mean, _LEAST) - 1) / sd
-    here = springs.at(u)
+    width = nats_of(sd)
+    springs = _Springs(sd, width, precision - np.eye(len(sd)), asked)
+    u = np.log(np.maximum(1 + mean, _LEAST)) / width
+    here, most = springs.at(u), _MOST / width
     for _ in range(_TURNS):
         further, there = u, here
         for share in _SHARES:
-            further = np.maximum(u - share * here.step, (_LEAST - 1) / sd)
+            further = np.clip(u - share * here.step, -most, most)
             there = springs.at(further)
             if there.value <= here.value:
                 break
@@ -71,6 +74,11 @@ def log_ratio(mean: Array, covariance: Array, sd: Array) -> float:
             break
     size = np.log(np.diag(factor_of(here.curved)) / np.diag(factor_of(precision))).sum()
     return float(-0.5 * (asked @ (mean / sd)) - here.value - size)
+
+
+def nats_of(sd: Array) -> Array:
+    """Standard deviations of the logarithm of what is lognormal with relative ones (m,)."""
+    return np.asarray(np.sqrt(np.log1p(sd**2)))
 
 
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.01)  # of a step
@@ -86,17 +94,19 @@ class _At(NamedTuple):
 
 
 class _Springs(NamedTuple):
-    """sd (m,), relative; of changes of the compliance in units of it: precision (m, m) by the data
-    alone, and what that of data and prior asks for (m,)."""
+    """sd (m,), relative; width (m,), of the logarithm; of changes of the compliance in units of sd:
+    precision (m, m) by the data alone, and what that of data and prior asks for (m,)."""
 
     sd: Array
+    width: Array
     told: Array
     asked: Array
 
     def at(self, u: Array) -> _At:
-        """Of stiffnesses that are u (m,) standard deviations off."""
-        whole = 1 / np.maximum(1 + self.sd * u, _LEAST)
-        change, first, second = -u * whole, -(whole**2), 2 * self.sd * whole**3
+        """Of compliances whose logarithm is u (m,) standard deviations off."""
+        softer = np.exp(self.width * u)
+        change = (softer - 1) / self.sd
+        first, second = softer * self.width / self.sd, softer * self.width**2 / self.sd
         left = self.told @ change - self.asked
         value = 0.5 * float(u @ u) + 0.5 * float(change @ (left - self.asked))
         curved = np.eye(len(u)) + first[:, None] * self.told * first

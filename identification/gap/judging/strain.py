@@ -18,6 +18,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
+from identification.gap.evidence.stiffness import nats_of
 from identification.gap.explanations.explanation import REMAINDER
 from identification.gap.explanations.fit import Fit
 from identification.gap.explanations.verdict import ARM_AS_STATED
@@ -104,7 +105,9 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
     springs = list(base.springs.values())
     stated = fitted.base.copy()
-    stated[springs] = [_of_stiffness(float(change)) for change in stated[springs]]
+    stated[springs] = base.sd[springs] * [
+        _of_springs(float(fitted.base[i]), float(base.sd[i])) for i in springs
+    ]
     pulls = np.abs(stated) / np.hypot(base.sd, loose)
     for j in _springs_that_may(engine, fitted):
         pulls[base.index(f"spring{j + 1}")] = 0.0
@@ -132,15 +135,15 @@ def _springs_and_gains(engine: Engine, fitted: Fit) -> dict[str, float]:
     free = {f"spring{j + 1}" for j in _springs_that_may(engine, fitted)}
     for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
         if name.startswith("spring") and name not in free:
-            out[name] = abs(_of_stiffness(change)) / sd
+            out[name] = abs(_of_springs(change, sd))
         elif name.startswith("gain"):
             out[name] = max(abs(change), abs(change / max(1 - change, _NEARLY_NONE))) / sd
     return out
 
 
-def _of_stiffness(change: float) -> float:
-    """Relative change of a stiffness by one of its compliance: what is stated of springs."""
-    return change / max(1 + change, _NEARLY_NONE)
+def _of_springs(change: float, sd: float) -> float:
+    """Standard deviations that a relative change of a compliance is, of what is lognormal."""
+    return float(np.log(max(1 + change, _NEARLY_NONE)) / nats_of(np.array(sd)))
 
 
 _NEARLY_NONE = 1e-6
