@@ -342,14 +342,14 @@ def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> 
         at = float(found.info["at"])
         return [replace(found, info={"at": at + k * close}) for k in (-1, 0, 1)]
 
-    def scored(_: object, __: object, ___: object, family: list[Variant]) -> list[SimpleNamespace]:
+    def scored(_: object, family: list[Variant]) -> list[SimpleNamespace]:
         looked.append(len(family))
         return [
             SimpleNamespace(variant=v, log_evidence=-((float(v.info["at"]) - 3.2) ** 2))
             for v in family
         ]
 
-    monkeypatch.setattr("identification.gap.laws.closer.scored_beside", scored)
+    monkeypatch.setattr("identification.gap.laws.closer.scored", scored)
     word = SimpleNamespace(
         engine=SimpleNamespace(extend=lambda: None, bench=None), families={}, ranked=[]
     )

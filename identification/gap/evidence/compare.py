@@ -87,7 +87,7 @@ def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
 
 def likelier_there(engine: Engine, v: Variant) -> float:
     """Nats by which a mechanism of one joint is likelier for being that joint's."""
-    if v.joint is None or v.word not in MECHANISMS:
+    if not engine.bench.data.arm or v.joint is None or v.word not in MECHANISMS:
         return 0.0
     return float(engine.bench.likelier_joints[v.joint])
 

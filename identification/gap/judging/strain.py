@@ -125,7 +125,8 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
 
 def most_off(engine: Engine, fitted: Fit) -> float:
     """By how many standard deviations springs and gains are off at most, but for those that may be.
-    What is normal in a gain is not in the share of its readings that is too much: by both."""
+    What is normal in a gain is not in the share of its readings that is too much, nor what is in
+    the compliance of a rig without an arm in its stiffness: by both."""
     return max(_springs_and_gains(engine, fitted).values(), default=0.0)
 
 
@@ -134,10 +135,14 @@ def _springs_and_gains(engine: Engine, fitted: Fit) -> dict[str, float]:
     base, out = engine.base, {}
     free = {f"spring{j + 1}" for j in _springs_that_may(engine, fitted)}
     for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
-        if name.startswith("spring") and name not in free:
+        spring = name.startswith("spring")
+        if name in free or not (spring or name.startswith("gain")):
+            continue
+        if spring and engine.bench.data.arm:
             out[name] = abs(_of_springs(change, sd))
-        elif name.startswith("gain"):
-            out[name] = max(abs(change), abs(change / max(1 - change, _NEARLY_NONE))) / sd
+        else:
+            whole = 1 + change if spring else 1 - change
+            out[name] = max(abs(change), abs(change / max(whole, _NEARLY_NONE))) / sd
     return out
 
 
