@@ -81,9 +81,7 @@ def search(
     ranked = measured(engine, ranked)
     named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
     strange = {
-        lv.eta: lv.log_base + as_stiff_as_stated(engine, (), lv.number)
-        for lv in engine.levels
-        if lv.eta > _hidden(engine)
+        lv.eta: _base_at(engine, lv.number) for lv in engine.levels if lv.eta > _hidden(engine)
     }
     found = SearchResult(
         engine=engine,
@@ -108,8 +106,12 @@ def _as_stated(engine: Engine) -> float:
     less = float(
         np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0], [_SURE_SHARE, _UNSURE_SHARE])
     )
-    least = engine.levels[0].log_base + as_stiff_as_stated(engine, (), 0)
-    return log_mean([least, *more], [1 - less, *(less / len(more) for _ in more)])
+    return log_mean([_base_at(engine, 0), *more], [1 - less, *(less / len(more) for _ in more)])
+
+
+def _base_at(engine: Engine, level: int) -> float:
+    """log evidence of the base alone at a level, springs as they are stated."""
+    return engine.levels[level].log_base + as_stiff_as_stated(engine, (), level)
 
 
 # What readings have in common with the next ones of their hold, they have with all of it, and more:
@@ -317,9 +319,7 @@ def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
     What was stated was looked at between them before, and shuts out nobody by what it gained there;
     but for what laws of the simulation's own effects may leave."""
     done: dict[frozenset[str], Explanation] = {}
-    stiff = as_stiff_as_stated(engine, (), 0)
-    stated = engine.levels[0].log_base + stiff + LOG_NONE
-    stated = stated if engine.bench.known is None else np.inf
+    stated = _base_at(engine, 0) + LOG_NONE if engine.bench.known is None else np.inf
     first = max(e.log_weight if e.parts else min(e.log_weight, stated) for e in ranked)
     most = 0.0
     for _ in range(_SHARPENED):
