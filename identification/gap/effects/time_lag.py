@@ -21,7 +21,6 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.laws.closer import (
     Word,
-    about_springs,
     closing_in,
     evidence,
     scored_beside,
@@ -31,6 +30,7 @@ from identification.gap.laws.effect import Effect
 from identification.gap.laws.in_swing import steady_way
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.laws.springs_found import about_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import (
     averaged,

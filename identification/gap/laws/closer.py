@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from identification.arrays import Array
 from identification.gap.evidence.compare import Scored, closest, marginal, score
 from identification.gap.evidence.engine import Engine
@@ -16,10 +14,10 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.law import Laws
+from identification.gap.laws.springs_found import about_springs
 from identification.gap.model.variants import Variant, place_of
 
 _REFINED = 2  # joints, or axes, at which it is refined
-_STEPS = 2  # to the springs beside what goes through them
 _CLOSE = 0.2  # of the first look's steps
 _LOOKS = 6  # at most, at one share of the steps
 _FAR = 60.0  # nats below the best of them
@@ -168,16 +166,6 @@ def places(
         by_place.setdefault(place_of(s.variant), s)
     found = [*first, *list(by_place.values())[:most]]
     return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]
-
-
-def about_springs(laws: Laws, engine: Engine, found: Variant) -> Variant:
-    """What goes through the springs, with the springs as they are found to be beside it."""
-    v = found
-    for _ in range(_STEPS):
-        softer = estimate(engine, v).softer
-        compliance = engine.bench.compliance * np.maximum(1 + softer, 0.1)
-        v = laws.about_springs(engine.bench, found, compliance)
-    return v
 
 
 def best_about_springs(laws: Laws, word: Word) -> list[Variant]:

@@ -15,7 +15,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws.flows import Flow
 from identification.gap.model.bench import Bench
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import CALLED, Variant
 
 
 @dataclass(frozen=True)
@@ -92,11 +92,12 @@ class Laws:
         law, scale = self.of(bench, variant)
         law = replace(law, constants={**law.constants, "about": tuple(compliance.tolist())})
         columns = (self.rows(bench, law) * scale).T
+        name = variant.info.get(CALLED, variant.label)
         return replace(
             variant,
-            label=f"{variant.label}, {AS_THEY_ARE}",
+            label=f"{name}, {AS_THEY_ARE}",
             columns=tuple(map(bench.add, columns)),
-            info={**variant.info, "compliance": compliance},
+            info={**variant.info, CALLED: name, "compliance": compliance},
         )
 
 

@@ -28,6 +28,7 @@ from identification.gap.model.variants import Variant
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
 from identification.gap.search.standing import standing_anew
+from identification.gap.search.through import through_springs_anew
 from identification.gap.words import MECHANISMS, NAMELESS, SPRINGS
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
@@ -304,9 +305,14 @@ def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
 
 
 def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
-    """With instruments that read what its other effects do, and a pose that is looked at beside
-    them, if that is better; the variants then hold these as well."""
-    fresh = reading_all(engine, start) + standing_anew(engine, start)
+    """With instruments that read what its other effects do, and a pose, and what goes through the
+    springs, that are looked at beside them, if that is better; the variants then hold these as
+    well."""
+    fresh = [
+        *reading_all(engine, start),
+        *standing_anew(engine, start),
+        *through_springs_anew(engine, start),
+    ]
     if not fresh:
         return start
     variants += fresh

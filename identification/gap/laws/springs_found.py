@@ -1,0 +1,94 @@
+"""The springs that an effect goes through, found together with it.
+
+What pulls across the load, a drift of the force or a lag moves the target by `(1 + s) w`, with s
+the change of a spring and w the coefficient: a product. Going to and fro between the two need not
+end anywhere (a joint that the load itself hardly turns has its spring from what pulls across alone)
+and may end with a spring that is off the wrong way. Here both are solved for at once, by Gauss and
+Newton: about s and w the product is `w + s dw + w ds`, to second order in what is still missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.gap.evidence.compare import closest, score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import conditioned
+from identification.gap.explanations.fit import weighed
+from identification.gap.laws.law import Laws
+from identification.gap.model.variants import Variant, block
+
+_FAR = 0.1, 10.0  # of the simulated compliance: no spring is softer or stiffer by more
+_STEPS = 12  # at most: four are enough where they end anywhere
+_DONE = 1e-3  # of a spring
+_LEVELS = 2  # of imperfection, at most, that springs are found with
+
+
+def about_springs(
+    laws: Laws, engine: Engine, found: Variant, beside: tuple[Part, ...] = ()
+) -> Variant:
+    """What goes through the springs, with the springs as they are found to be with it and with
+    other parts beside it."""
+    out, done = found, list[float]()
+    for _ in range(_LEVELS):
+        levels, energy = conditioned(engine, beside)
+        best = closest(score(engine, levels, [out], energy))
+        eta = float(engine.levels[best.level].eta)
+        if eta in done:
+            break
+        done.append(eta)
+        compliance = springs_found(laws, engine, Part(out, best.scale), beside, eta)
+        out = laws.about_springs(engine.bench, found, compliance)
+    return out
+
+
+def springs_found(
+    laws: Laws, engine: Engine, part: Part, beside: tuple[Part, ...], eta: float
+) -> Array:
+    """(m,) rad/Nm (of a rig without an arm m/N): compliance of the springs that are likeliest
+    together with a part that goes through them, with an imperfection of eta m, beside other
+    parts."""
+    bench, base = engine.bench, engine.base
+    each, rest = _through_each(laws, engine, part.variant)
+    own, spring = list(base.springs), list(base.springs.values())
+    others = engine.columns(c for p in beside for c in p.variant.columns)
+    root = block([np.diag(base.sd), *(p.root for p in beside), part.root])
+    softer, w = np.zeros(len(own)), np.zeros(len(part.variant.columns))
+    for _ in range(_STEPS):
+        through = each @ w  # (springs, size) what each of them, as simulated, does to the part
+        columns = base.columns.copy()
+        columns[:, spring] += through.T
+        now = rest + np.tensordot(1 + softer, each, axes=1)
+        X = np.hstack([columns, others, now]) @ root
+        precise = weighed(engine, X, eta)
+        target = engine.target + softer @ through
+        x = root @ np.linalg.solve(precise.T @ X + np.eye(len(root)), precise.T @ target)
+        last, softer = softer, np.clip(1 + x[spring], *_FAR) - 1
+        w = x[len(x) - len(w) :]
+        if np.abs(softer - last).max(initial=0.0) < _DONE:
+            break
+    out = bench.compliance.copy()
+    out[own] *= 1 + softer
+    return out
+
+
+def _through_each(laws: Laws, engine: Engine, variant: Variant) -> tuple[Array, Array]:
+    """What a variant does through each spring of the base, as simulated (springs, size, k), and
+    through nothing of these (size, k): columns are linear in the compliance of each."""
+    bench, own = engine.bench, list(engine.base.springs)
+    law, scale = laws.of(bench, variant)
+
+    def through(compliance: Array) -> Array:
+        about = {**law.constants, "about": tuple(compliance.tolist())}
+        return laws.rows(bench, replace(law, constants=about)) * scale
+
+    kept = bench.compliance.copy()
+    kept[own] = 0.0
+    rest = through(kept)
+    alone = [np.where(np.arange(len(kept)) == j, bench.compliance, kept) for j in own]
+    each = np.array([through(c) - rest for c in alone])
+    return each.reshape(len(own), *rest.shape), rest
