@@ -10,7 +10,16 @@ from identification.gap.effects import base_slip, contact_seating, joint_creep, 
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.laws import lost_motion
 from identification.gap.laws.friction_law import FRICTION_LAWS, GROWS, SLIP_AT_A_STRENGTH
-from identification.gap.laws.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
+from identification.gap.laws.law import (
+    ACROSS,
+    ANEW,
+    AS_IT_STANDS,
+    HUNG,
+    HUNG_LOST,
+    KEPT,
+    LOST,
+    WORKED,
+)
 from rig.units import MM_PER_M
 
 # What an entry says besides its law; kept, not interpreted.
@@ -77,6 +86,7 @@ CONSTANTS: dict[str, Key] = {
     "only_in": Key("only_in_pose", "text"),
     "unread": Key("joint_readings_do_not_show_it", "flag"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
+    AS_IT_STANDS: Key("on_the_arm_as_it_stands", "flag"),
 }
 SHAPES: dict[str, Key] = {
     "threshold": Key("threshold_Nm", "positive"),
@@ -164,6 +174,7 @@ MAY_BE_MISSING = (
     joint_creep.STOOD_ON,
     "only_in",
     "unread",
+    AS_IT_STANDS,
 )
 
 
@@ -214,11 +225,12 @@ def _on(paths: Mapping[Kind, tuple[str, ...]]) -> dict[Kind | str, Values]:
 
 GRAMMAR: dict[str, Grammar] = {
     "joint_yield": Grammar(
-        ("joint", "memory", "flow_time", "flow_exponent"), (*_PLAYS, ("compliance", ()))
+        ("joint", "memory", "flow_time", "flow_exponent", AS_IT_STANDS),
+        (*_PLAYS, ("compliance", ())),
     ),
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
-        ("joint", "law", "memory", "measured_to", "saturates", "tool"),
+        ("joint", "law", "memory", "measured_to", "saturates", "tool", AS_IT_STANDS),
         (
             _STRENGTH,
             _SLACKENS,
@@ -233,7 +245,7 @@ GRAMMAR: dict[str, Grammar] = {
         },
     ),
     "joint_backlash": Grammar(
-        ("joint", "zone", "crossing", "kind", "tool", "preload"),
+        ("joint", "zone", "crossing", "kind", "tool", "preload", AS_IT_STANDS),
         (
             ("width", ()),
             ("rub", ()),
@@ -242,7 +254,7 @@ GRAMMAR: dict[str, Grammar] = {
         ),
     ),
     "joint_nonlinear_stiffness": Grammar(
-        ("joint", "measured_to", "tool"),
+        ("joint", "measured_to", "tool", AS_IT_STANDS),
         (
             ("compliance", ("beyond",)),
             ("compliance", ("net_above",)),
@@ -254,7 +266,7 @@ GRAMMAR: dict[str, Grammar] = {
         ),
     ),
     "joint_creep": Grammar(
-        ("joint", "forgets", joint_creep.STOOD_ON),
+        ("joint", "forgets", joint_creep.STOOD_ON, AS_IT_STANDS),
         (
             ("compliance", ("retardation_time",)),
             ("compliance_quadratic", ("retardation_time",)),

@@ -55,7 +55,7 @@ def predict(
     moved = bench.rows.displacement.copy()
     for f in forms:
         if f.word not in _LAST:
-            moved += realise(bench, f)[: bench.rows.n]
+            moved += realise(bench, f, forms)[: bench.rows.n]
     gains = [f for f in forms if f.word == "displacement_scale"]
     if gains:
         moved = _shown(bench, gains, moved)

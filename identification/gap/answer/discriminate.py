@@ -240,15 +240,19 @@ def _simulated(
     data = planned(design, bench)
     plain = make_bench(data)
     _ahead(plain, rivals)
-    moved = [sum((realise(plain, f) for f in r.forms), _spring_changes(plain, r)) for r in rivals]
+    moved = [_moved(plain, r) for r in rivals]
     # the noise of a force counts by the slope of the curve: knees belong into it
     middle = (moved[0][: plain.rows.n] + moved[1][: plain.rows.n]) / 2
     count = plain.rows.weight.astype(np.int64)
     there = make_bench(_with_response(plain, data, np.repeat(middle, count)))
     there = replace(_with_noise(bench, there), flows=plain.flows)  # the load is the same
-    return [
-        sum((realise(there, f) for f in r.forms), _spring_changes(there, r)) for r in rivals
-    ], there
+    return [_moved(there, r) for r in rivals], there
+
+
+def _moved(there: Bench, rival: Rival) -> Array:
+    """(size,) what a rival's effects and springs add to the simulation."""
+    beside = (*rival.forms, *rival.rest)
+    return sum((realise(there, f, beside) for f in rival.forms), _spring_changes(there, rival))
 
 
 def _ahead(there: Bench, rivals: tuple[Rival, Rival]) -> None:
@@ -306,7 +310,7 @@ class _Carried:
 
 def _carried(there: Bench, rival: Rival) -> _Carried:
     def placed(variant: Variant, law: Law, unit: Array) -> Variant:
-        columns = rows_of(there, rival.word, law) * unit
+        columns = rows_of(there, rival.word, law, rival.rest) * unit
         return replace(variant, columns=tuple(there.add(c) for c in columns.T))
 
     top = max(w for *_, w in rival.shapes)
@@ -327,8 +331,9 @@ def _reached(
     far = []
     for r in rivals:
         moved = rows.displacement + _spring_changes(there, r)[:n]
-        for form in (*r.forms, *r.rest):
-            moved = moved + realise(there, form)[:n]
+        every = (*r.forms, *r.rest)
+        for form in every:
+            moved = moved + realise(there, form, every)[:n]
         datum = np.array([moved[np.argmax(rows.setup == s)] for s in range(len(design.setups))])
         far.append(np.abs(moved - datum[rows.setup]))
     largest, up = np.max(far, axis=0), rows.branch == LOADING

@@ -9,6 +9,7 @@ springs alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.law import Law
+from identification.gap.laws.as_it_stands import Acts, as_it_stands
+from identification.gap.laws.law import AS_IT_STANDS, Law
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 
@@ -29,6 +31,11 @@ class Form:
     law: Law
     values: Array
     covariance: Array
+
+    @property
+    def acts(self) -> Acts:
+        """What it does, its numbers taken as they are."""
+        return Acts(self.law, self.values)
 
 
 def law_of(bench: Bench, variant: Variant) -> tuple[Law, Array]:
@@ -45,14 +52,17 @@ def describe(bench: Bench, part: Part, w: Array, covariance: Array) -> Form:
     return Form(part.word, law, w * scale, covariance * np.outer(scale, scale))
 
 
-def rows_of(bench: Bench, word: str, law: Law) -> Array:
-    """(size, k): stacked columns of the law's terms on this bench, per SI unit."""
+def rows_of(bench: Bench, word: str, law: Law, beside: Iterable[Form] = ()) -> Array:
+    """(size, k): stacked columns of the law's terms on this bench, per SI unit. beside: effects of
+    the same rig, which may change the torques that the law is of."""
+    if law.constants.get(AS_IT_STANDS):
+        bench = as_it_stands(bench, (form.acts for form in beside))
     return EFFECTS[word].laws.rows(bench, law)
 
 
-def realise(bench: Bench, form: Form) -> Array:
-    """(size,): what the effect adds to every channel of this bench."""
-    return np.asarray(rows_of(bench, form.word, form.law) @ form.values)
+def realise(bench: Bench, form: Form, beside: Iterable[Form] = ()) -> Array:
+    """(size,): what the effect adds to every channel of this bench. beside: as there."""
+    return np.asarray(rows_of(bench, form.word, form.law, beside) @ form.values)
 
 
 def lawful(form: Form) -> Form:

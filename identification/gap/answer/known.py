@@ -102,8 +102,9 @@ _CLOSELY = 1.5  # of the noise: sizes of imperfection are as coarse
 
 def _with_known(bench: Bench, forms: Sequence[Form]) -> Bench:
     """The bench with these effects known, whatever they remember."""
+    every = [lawful(f) for f in forms]
     less, does, more = (
-        np.column_stack([_stacked(_pushed(bench, by), lawful(f)) for f in forms])
+        np.column_stack([_stacked(_pushed(bench, by), f, every) for f in every])
         for by in (1 - LOAD_SD, 1.0, 1 + LOAD_SD)
     )
     later, whole = (more - less) / 2, np.linalg.norm(does, axis=0)
@@ -124,9 +125,10 @@ def _pushed(bench: Bench, by: float) -> Bench:
     return bench if by == 1 else replace(bench, load=by * bench.load, torque=by * bench.torque)
 
 
-def _stacked(bench: Bench, form: Form) -> Array:
-    """(size,) what an effect does, the response counted from where the laser was zeroed."""
-    rows, total = bench.rows, realise(bench, form)
+def _stacked(bench: Bench, form: Form, every: Sequence[Form]) -> Array:
+    """(size,) what an effect does beside all others, the response counted from where the laser was
+    zeroed."""
+    rows, total = bench.rows, realise(bench, form, every)
     group = rows.run if bench.data.datum == "repetition" else rows.setup
     for g in np.unique(group):
         mine = np.flatnonzero(group == g)

@@ -22,6 +22,7 @@ from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import NOMINAL, Coefficients, Parameter, Softer
+from identification.gap.laws.law import STANDS
 from identification.gap.model.bench import Bench
 
 
@@ -30,4 +31,6 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
     coefficients and their covariance; softer: what the springs turned out to be."""
-    return EFFECTS[part.word].parameters(bench, part.variant, Coefficients(w, cov, softer))
+    v, stands = part.variant, part.variant.info.get(STANDS)
+    there = bench if stands is None else stands(bench)
+    return EFFECTS[part.word].parameters(there, v, Coefficients(w, cov, softer))

@@ -181,8 +181,8 @@ def _as_written(engine: Engine, fitted: Fit) -> float | None:
         return None
     kept = [i for name in ("spring", "geometry", "datum", "known") for i in base.index(name)]
     gives = bench.response - engine.target[:n] + base.columns[:n, kept] @ fitted.base[kept]
-    for i, part in enumerate(fitted.parts):
-        gives = gives + realise(bench, lasting(describe(bench, part, *fitted.of(i))))[:n]
+    last = [lasting(describe(bench, p, *fitted.of(i))) for i, p in enumerate(fitted.parts)]
+    gives = gives + sum((realise(bench, form, last)[:n] for form in last), np.zeros(n))
     return sample_rms(bench, gives)
 
 

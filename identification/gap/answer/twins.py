@@ -19,7 +19,7 @@ from identification.gap.answer.forms import Form, law_of, rows_of
 from identification.gap.effects.base_slip import lever_of, places
 from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.law import Law, Term
+from identification.gap.laws.law import AS_IT_STANDS, Law, Term
 from identification.gap.model.bench import Bench
 
 _SAME = 1.0  # nats of misfit that another place may cost: nobody would call that evidence
@@ -36,7 +36,7 @@ class Twin:
 
     def moved(self, law: Law) -> Law:
         """The law at the other place."""
-        kept = {k: v for k, v in law.constants.items() if k not in PLACE}
+        kept = {k: v for k, v in law.constants.items() if k not in (*PLACE, AS_IT_STANDS)}
         terms = tuple(
             Term(t.coefficient, {k: v * self.factor for k, v in t.shape.items()}) for t in law.terms
         )

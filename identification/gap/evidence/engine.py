@@ -15,7 +15,8 @@ small eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -109,6 +110,15 @@ class Engine:
             NoiseLevel(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
             for i, (eta, b) in enumerate(zip(etas, self._bases, strict=True))
         ]
+
+    @contextmanager
+    def on(self, bench: Bench) -> Iterator[None]:
+        """Within it, effects are looked for on another bench of the same rows and pool."""
+        kept, self.bench = self.bench, bench
+        try:
+            yield
+        finally:
+            self.bench = kept
 
     @property
     def levels(self) -> list[NoiseLevel]:

@@ -10,6 +10,8 @@ direction, which has a compliance of its own, is read.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
 
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
@@ -48,6 +50,16 @@ def in_more_joints(engine: Engine, variants: Sequence[Variant], start: Explanati
                 break
             best = found
     return best
+
+
+def in_one_joint_each(start: Explanation) -> Explanation:
+    """With the largest part of each word alone, not compared with anything yet; as it is, where no
+    word has more. Other joints may have made up for what was wrong with the first one's law."""
+    first = {p.word: p for p in reversed(start.parts)}
+    if len(first) == len(start.parts):
+        return start
+    parts = tuple(p for p in start.parts if first[p.word] is p)
+    return replace(start, parts=parts, log_weight=-inf)
 
 
 def _each_seen(bench: Bench) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, Flags
 from identification.gap.data import Setup
 from identification.gap.laws.law import Law, Term, along, in_pose, triple
 from identification.gap.model.bench import Bench
@@ -99,21 +99,41 @@ def columns_of(bench: Bench, law: Law) -> list[Array]:
     for t in law.terms:
         if t.coefficient == "as_read":
             out.append(pulled_as_read(bench))
-            continue
-        drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
-        power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
-        how = Shape(power, at or 1.0, drags)
-        there = (along(bench, t.shape["along"]) > 0) & in_pose(bench, t.shape.get("pose"))
-        if "run" in t.shape:
-            there &= bench.rows.run == t.shape["run"]
-        load = np.where(there, across(bench, how), 0.0)
-        if t.coefficient == "gives" and "across" in t.shape:
-            load = np.where(there, _read_along(bench, t.shape["across"]), 0.0)
-        if t.coefficient == "gives":
-            out.append(gives(bench, load))
-            continue
-        out.append(pulled(bench, load, _shares(bench, t.shape["across"])))
+        elif t.coefficient == "gives" and "across" in t.shape:
+            read = _read_along(bench, t.shape["across"])
+            out.append(gives(bench, np.where(_acts(bench, t), read, 0.0)))
+        elif t.coefficient == "gives":
+            out.append(gives(bench, _load(bench, t)))
+        else:
+            out.append(pulled(bench, _load(bench, t), _shares(bench, t.shape["across"])))
     return out
+
+
+def torques_across(bench: Bench, law: Law, values: Array) -> Array:
+    """(n, m) Nm on the joints of an arm by a load across with the law's terms (k,)."""
+    out, setup = np.zeros((bench.rows.n, bench.data.joints)), bench.rows.setup
+    levers = np.stack([s.tangent_lever for s in bench.data.setups])  # (setups, 2, m)
+    for t, value in zip(law.terms, values, strict=True):
+        if t.coefficient == "as_read" and bench.rows.tangential is not None:
+            out += value * np.einsum("nk,nkj->nj", bench.rows.tangential, levers[setup])
+        elif t.coefficient == "tangent":
+            shares = _shares(bench, t.shape["across"])
+            lever = np.einsum("sk,skj->sj", shares, levers)[setup]
+            out += value * _load(bench, t)[:, None] * lever
+    return out
+
+
+def _acts(bench: Bench, t: Term) -> Flags:
+    """(n,) rows in which a term acts."""
+    there = (along(bench, t.shape["along"]) > 0) & in_pose(bench, t.shape.get("pose"))
+    return np.asarray(there & (bench.rows.run == t.shape["run"]) if "run" in t.shape else there)
+
+
+def _load(bench: Bench, t: Term) -> Array:
+    """(n,) N across that goes with the load, of a term of 1."""
+    drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
+    power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
+    return np.where(_acts(bench, t), across(bench, Shape(power, at or 1.0, drags)), 0.0)
 
 
 def _read_along(bench: Bench, direction: tuple[float, ...]) -> Array:

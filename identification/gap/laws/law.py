@@ -36,6 +36,8 @@ class Law:
 
 
 AS_THEY_ARE = "springs as they are"
+AS_IT_STANDS = "as_it_stands"  # a constant: of the torques on the arm as it stands (`as_it_stands`)
+STANDS = "stands"  # in `info` of such a variant: that arm's bench, from the simulated one's
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,9 @@ class Laws:
 
         Raises ValueError for a variant that says too little of itself.
         """
+        stands = variant.info.get(STANDS)
         try:
-            law, scale = self.describe(bench, variant)
+            law, scale = self.describe(bench if stands is None else stands(bench), variant)
         except KeyError as missing:
             raise ValueError(
                 f"{variant.word}, {variant.label}: the library does not say {missing} of this shape"
@@ -76,6 +79,8 @@ class Laws:
         if self.through_springs:
             about = tuple(float(c) for c in variant.info.get("compliance", bench.compliance))
             law = replace(law, constants={**law.constants, "about": about})
+        if stands is not None:
+            law = replace(law, constants={**law.constants, AS_IT_STANDS: True})
         return law, scale
 
     def rows(self, bench: Bench, law: Law) -> Array:

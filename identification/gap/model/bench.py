@@ -65,7 +65,8 @@ class Bench:
     scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
     time and response about it.
     columns: the pool, filled by the effects. moves (n,) m: what instruments of the response read,
-    where more is known of it than a straight line.
+    where more is known of it than a straight line. aside (n, m) Nm: torques beside those of the
+    load along the direction, of an arm that is known to stand otherwise than simulated.
     """
 
     data: GapData
@@ -89,6 +90,7 @@ class Bench:
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
     moves: Array | None = None
     known: KnownEffects | None = None
+    aside: Array | None = None
     # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
     lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 
@@ -163,7 +165,8 @@ class Bench:
     @cached_property
     def true_torque(self) -> Array:
         """(n, m) Nm on the joints without it: what thresholds, plays and friction answer to."""
-        return np.asarray(self.lever * self.true_load[:, None])
+        along = self.lever * self.true_load[:, None]
+        return np.asarray(along if self.aside is None else along + self.aside)
 
     def reach_of(self, load: Array) -> float:
         """Range of a load with zero in it. Where the displacement is imposed: of what the rig
@@ -289,6 +292,18 @@ class Bench:
         rows = copy(self.rows)
         object.__setattr__(rows, "overshoot", overshoot)
         for name, value in (("rows", rows), ("flows", {}), ("lags", {})):
+            object.__setattr__(out, name, value)
+        return out
+
+    def standing(self, lever: Array, aside: Array) -> Bench:
+        """The bench of an arm with these levers (n, m) m, and torques aside (n, m) Nm; what is
+        known of it else stays, and its pool."""
+        out = copy(self)
+        for known in ("true_torque", "likelier_joints"):
+            out.__dict__.pop(known, None)
+        torque = lever * self.load[:, None] + aside
+        values = {"lever": lever, "aside": aside, "torque": torque, "flows": {}, "lags": {}}
+        for name, value in {**values, "elastic": torque * self.compliance}.items():
             object.__setattr__(out, name, value)
         return out
 

@@ -21,10 +21,11 @@ from identification.gap.explanations.explanation import (
     up_to_likeliest,
 )
 from identification.gap.explanations.priors import LOG_NONE, log_unknown
-from identification.gap.explanations.several import in_more_joints, polished
+from identification.gap.explanations.several import in_more_joints, in_one_joint_each, polished
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.model.noise import UNSURE
 from identification.gap.model.variants import Variant
+from identification.gap.search.acting import acting_anew
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
 from identification.gap.search.standing import standing_anew
@@ -305,18 +306,39 @@ def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
 
 
 def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
-    """With instruments that read what its other effects do, and a pose, and what goes through the
-    springs, that are looked at beside them, if that is better; the variants then hold these as
-    well."""
-    fresh = [
-        *reading_all(engine, start),
-        *standing_anew(engine, start),
-        *through_springs_anew(engine, start),
-    ]
+    """With instruments that read what its other effects do, a pose, and what goes through the
+    springs, that are looked at beside them, and mechanisms that answer to these, if that is better;
+    the variants then hold these as well."""
+    found = _with(engine, variants, start, _read_and_placed(engine, start))
+    for _ in range(_TURNS):  # where the arm stands was found beside a law of the simulated torques
+        plain = in_one_joint_each(found)
+        acting = _with(engine, variants, plain, acting_anew(engine, plain))
+        if acting.log_weight <= found.log_weight + _TURN_GAINS:
+            break
+        found = _with(engine, variants, acting, _read_and_placed(engine, acting))
+    return found
+
+
+_TURNS, _TURN_GAINS = 4, 3.0  # at most; nats
+
+
+def _with(
+    engine: Engine, variants: list[Variant], start: Explanation, fresh: list[Variant]
+) -> Explanation:
+    """Polished with fresh variants, which the variants then hold as well."""
     if not fresh:
         return start
     variants += fresh
     return polished(engine, variants, start)
+
+
+def _read_and_placed(engine: Engine, start: Explanation) -> list[Variant]:
+    """What reads all that moves, stands elsewhere, or goes through springs that are off."""
+    return [
+        *reading_all(engine, start),
+        *standing_anew(engine, start),
+        *through_springs_anew(engine, start),
+    ]
 
 
 def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:

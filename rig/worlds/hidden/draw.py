@@ -5,7 +5,7 @@ Gives what an experimenter would have (a table and its META) and, apart from it,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -111,8 +111,6 @@ def _words(random: Generator, word: str | None, second: str | None) -> tuple[str
 
 
 def _plan_for(random: Generator, design: str | None, words: tuple[str, ...]) -> Any:
-    from dataclasses import replace
-
     plan = draw_plan(random, design)
     if ON_THE_CLOCK.intersection(words):
         plan = replace(plan, recorded=replace(plan.recorded, session=True))
@@ -149,16 +147,24 @@ def _try_case(
 def _sized(
     scene: Scene, random: Generator, words: tuple[str, ...], laws: str | None, gap_mm: float
 ) -> list[tuple[Effect, float]]:
-    """Effects with sizes whose structural gap together is about `gap_mm` rms."""
+    """Effects with sizes whose structural gap together is about `gap_mm` rms. What turns the load
+    comes first: mechanisms answer to the torques that are there with it."""
     shares = [1.0]
     if len(words) == 2:
         tilt = float(np.exp(random.uniform(np.log(0.5), np.log(2.0))))
         shares = [tilt / np.hypot(1, tilt), 1 / np.hypot(1, tilt)]
     out = []
-    for word, share in zip(words, shares, strict=True):
+    for word, share in sorted(zip(words, shares, strict=True), key=lambda one: _answers(one[0])):
         effect = _draw_effect(scene, random, word, laws)
         out.append((effect, _solve(scene, effect, share * gap_mm)))
+        if not _answers(word):
+            scene = replace(scene, turned=effect.change(out[-1][1]))
     return out
+
+
+def _answers(word: str) -> bool:
+    """Whether it answers to the torques, or goes beside them, rather than turning the load."""
+    return word not in ("pose_error", "load_misalignment")
 
 
 def _draw_effect(scene: Scene, random: Generator, word: str, laws: str | None) -> Effect:

@@ -52,7 +52,8 @@ class History:
 class Scene:
     """Plan, history and nominal geometry: of each setup levers (s, 6, 3) m per rad, tool (s, 3) m
     over the base, unit (s, 3), weight (s, 6) Nm on the joints, of arm and tool; poses (s) as
-    numbers."""
+    numbers. turned: where the arm stands otherwise or is pulled across, so that its joints carry
+    other torques."""
 
     plan: Plan
     history: History
@@ -61,12 +62,16 @@ class Scene:
     unit: Array
     weight: Array
     pose: Index
+    turned: Change | None = None
 
     @cached_property
     def torque(self) -> Array:
-        """(n, 6) Nm on the joints under the load as planned."""
-        along = np.einsum("sij,sj->si", self.levers, self.unit)
-        return np.asarray(along[self.history.setup] * self.history.load[:, None])
+        """(n, 6) Nm on the joints under the load as it acts, the weights as planned."""
+        setup, load = self.history.setup, self.history.load
+        changed = self.turned or Change()
+        levers = self.levers if changed.levers is None else changed.levers
+        pulls = self.unit[setup] if changed.across is None else self.unit[setup] + changed.across
+        return np.asarray(np.einsum("nij,nj->ni", levers[setup], pulls) * load[:, None])
 
     @cached_property
     def net(self) -> Array:

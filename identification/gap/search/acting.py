@@ -1,0 +1,62 @@
+"""Mechanisms on the arm as it stands: beside a wrong pose, or a load across, joints carry other
+torques than simulated, and move the target by other levers."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from identification.gap.effects import EFFECTS
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation, conditioned
+from identification.gap.explanations.fit import fit
+from identification.gap.laws.as_it_stands import Acts, as_it_stands, turns_load
+from identification.gap.laws.closer import Word, evidence
+from identification.gap.laws.law import STANDS
+from identification.gap.model.variants import Variant, place_of
+from identification.gap.words import IN_JOINTS
+
+_HOPELESS = 60.0  # nats below what there is: its finer shapes won't do better either
+
+
+def acting_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
+    """Variants of a joint's mechanism beside what turns the load, in an explanation of the two that
+    leaves more than noise: on the arm as it then stands, at the same place; the pool of the bench
+    holds their columns afterwards. None where nothing turns the load."""
+    bench, parts = engine.bench, explanation.parts
+    mine = [p for p in parts if p.word in IN_JOINTS]
+    if len(parts) != _TWO or len(mine) != 1 or not explanation.eta > 0 or not bench.data.arm:
+        return []
+    acts, fitted = [], fit(engine, explanation)
+    for i, other in enumerate(parts):
+        if other is not mine[0]:
+            law, scale = EFFECTS[other.word].laws.of(bench, other.variant)
+            acts.append(Acts(law, scale * fitted.of(i)[0]))
+    if bench.imposed or not any(turns_load(a.law) for a in acts):
+        return []
+    stands = partial(as_it_stands, acts=acts)
+    with engine.on(stands(bench)):
+        found = _shapes(engine, mine[0], next(p for p in parts if p is not mine[0]))
+    return [v.known_by(_WHERE, **{STANDS: stands}) for v in found]
+
+
+_TWO = 2
+_WHERE = ", on the arm as it stands"
+
+
+def _shapes(engine: Engine, part: Part, other: Part) -> list[Variant]:
+    """Of a part's word at its place, on the engine's bench, those of the grid and finer ones about
+    the best of them, beside another part."""
+    effect = EFFECTS[part.word]
+    grid = [v for v in effect.variants(engine.bench) if place_of(v) == place_of(part.variant)]
+    levels, energy = conditioned(engine, (Part(other.variant, other.scale),))
+    beside = sorted(score(engine, levels, grid, energy), key=evidence, reverse=True)
+    now = score(engine, levels, [part.variant], energy)[0]
+    if not beside or effect.finer is None:
+        return grid
+    if beside[0].log_evidence < now.log_evidence - _HOPELESS:
+        return grid
+    alone = sorted(score(engine, engine.levels, grid), key=evidence, reverse=True)
+    families = {other.word: score(engine, engine.levels, [other.variant]), part.word: alone}
+    return [*grid, *effect.finer(Word(engine, families, [other.word, part.word], alone, beside))]

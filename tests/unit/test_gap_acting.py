@@ -1,0 +1,200 @@
+"""Effects that meet: springs that are off with what goes through them, and mechanisms with what
+turns the load. Both are products of two unknowns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.gap.answer.forms import describe, realise
+from identification.gap.data import GapData
+from identification.gap.effects import EFFECTS, library
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+from identification.gap.laws.as_it_stands import as_it_stands
+from identification.gap.laws.law import AS_IT_STANDS, STANDS
+from identification.gap.laws.springs_found import springs_found
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
+from identification.gap.search.acting import acting_anew
+from identification.gap.search.search import search
+from identification.gap.search.through import through_springs_anew
+from identification.gap.words import IN_JOINTS
+from tests.unit.test_gap_forms import arm_data
+
+ETAS = np.array([0.0, 1e-6, 4e-6, 2e-5])
+WEAK = 1  # a joint that the load along x and y hardly turns, and one across does
+SOFTER = np.array([1.0, 1.4, 1.0, 1.0, 1.0, 1.0])
+
+
+def engine_of(data: GapData) -> Engine:
+    bench = make_bench(data)
+    return Engine(bench, base_columns(bench), bench.observed - prediction(bench), ETAS)
+
+
+def measured(data: GapData, there: Bench, added: Array) -> GapData:
+    """What would have been measured on a bench, of its simulation and more (size,), with noise."""
+    assert data.q is not None
+    assert data.tangential is not None
+    total, rows, layout = prediction(there) + added, there.rows, there.layout
+    count = rows.weight.astype(int)
+    holds = np.add.reduceat(count, np.flatnonzero(rows.hold_starts))
+    noise = data.displacement - 1.1e-5 * data.force
+    q = total[layout.q].reshape(data.joints, -1).T
+    across = total[layout.tangential].reshape(2, -1).T
+    return replace(
+        data,
+        displacement=np.repeat(total[: rows.n], count) + noise,
+        q=data.q + np.repeat(q, holds, axis=0),
+        tangential=data.tangential + np.repeat(across, holds, axis=0),
+    )
+
+
+def labelled(bench: Bench, word: str, label: str) -> Variant:
+    return next(v for v in library(bench, [word]) if v.label == label)
+
+
+def test_a_spring_that_only_what_pulls_across_shows_is_found_with_it() -> None:
+    """Its own column says next to nothing; taken from that alone it is off the wrong way."""
+    data = arm_data()
+    there = make_bench(data, compliance=data.compliance * SOFTER)
+    across = labelled(there, "load_misalignment", "all directions")
+    w = np.array([0.0, -0.25, 0.15, -0.2])
+    seen = measured(data, there, sum(w[i] * there.columns[c] for i, c in enumerate(across.columns)))
+    engine = engine_of(seen)
+    found = labelled(engine.bench, across.word, across.label)
+    laws = EFFECTS[across.word].laws
+    best = score(engine, engine.levels, [found])[0]
+    compliance = springs_found(laws, engine, Part(found, best.scale), (), 0.0)
+    assert compliance[WEAK] / data.compliance[WEAK] == pytest.approx(SOFTER[WEAK], rel=0.03)
+    assert compliance[2:] == pytest.approx(data.compliance[2:], rel=0.03)
+
+
+def test_springs_are_found_anew_beside_another_effect_where_more_than_noise_is_left() -> None:
+    data = arm_data()
+    there = make_bench(data, compliance=data.compliance * SOFTER)
+    across = labelled(there, "load_misalignment", "all directions")
+    w = np.array([0.0, -0.25, 0.15, -0.2])
+    pulls = sum(w[i] * there.columns[c] for i, c in enumerate(across.columns))
+    creep = next(v for v in library(there, ["joint_creep"]) if v.info["joint"] == 2)
+    crept = there.columns[creep.columns[0]]
+    crept = 4e-5 / np.abs(crept[: there.rows.n]).max() * crept
+    engine = engine_of(measured(data, there, pulls + crept))
+    shapes = [labelled(engine.bench, v.word, v.label) for v in (across, creep)]
+    parts = tuple(Part(s.variant, s.scale) for s in score(engine, engine.levels, shapes))
+    left = Explanation(parts, 0.0, float(ETAS[2]), (0.0, 0.0), 0.0)
+    again = through_springs_anew(engine, left)
+    assert [v.word for v in again] == ["load_misalignment"]
+    compliance = again[0].info["compliance"]
+    assert compliance[WEAK] / data.compliance[WEAK] == pytest.approx(SOFTER[WEAK], rel=0.03)
+    assert through_springs_anew(engine, replace(left, eta=0.0)) == []
+    # what is there already is not found once more
+    parts = (Part(again[0], parts[0].scale), parts[1])
+    assert through_springs_anew(engine, replace(left, parts=parts)) == []
+
+
+OFFSET = np.array([0.05, 0.1, 0.08])
+JOINT = 4
+
+
+def off_and_rubbing() -> GapData:
+    """An arm whose tool is elsewhere and whose wrist rubs, at the torques that there are then."""
+    data = arm_data()
+    plain = make_bench(data)
+    tool = labelled(plain, "pose_error", "tool 150 mm")
+    form = describe(plain, Part(tool, 1.0), OFFSET, np.eye(3))
+    stands = as_it_stands(plain, [form.acts])
+    rubs = next(
+        v
+        for v in EFFECTS["joint_hysteresis"].variants(stands)
+        if v.info["joint"] == JOINT and v.label.endswith("spectrum that slips")
+    )
+    column = stands.columns[rubs.columns[len(rubs.columns) // 2]]
+    moved = 1e-4 / np.abs(column[: plain.rows.n]).max() * column
+    # the place itself, to second order as arms move
+    shifts = EFFECTS["pose_error"].laws.rows(
+        plain, replace(form.law, constants={**form.law.constants, "about_offset": tuple(OFFSET)})
+    )
+    return measured(data, plain, shifts @ OFFSET + moved)
+
+
+def test_levers_and_torques_are_those_of_the_arm_as_it_stands() -> None:
+    bench = make_bench(arm_data())
+    tool = labelled(bench, "pose_error", "tool 150 mm")
+    stands = as_it_stands(bench, [describe(bench, Part(tool, 1.0), OFFSET, np.eye(3)).acts])
+    across = labelled(bench, "load_misalignment", "direction x")
+    form = describe(bench, Part(across, 1.0), np.array([0.1, 0.0]), np.eye(2))
+    pulled = as_it_stands(bench, [form.acts])
+    for s, setup in enumerate(bench.data.setups):
+        mine = np.flatnonzero(bench.rows.setup == s)[5]
+        # what the same tool would have as simulated
+        wanted = setup.lever + setup.offset_lever @ OFFSET
+        assert stands.lever[mine] == pytest.approx(wanted)
+        assert stands.true_torque[mine] == pytest.approx(wanted * bench.true_load[mine])
+        aside = 0.1 * bench.load[mine] * setup.tangent_lever[0] * (setup.direction == "x")
+        along = setup.lever * bench.true_load[mine]
+        assert pulled.true_torque[mine] == pytest.approx(along + aside)
+        assert pulled.lever[mine] == pytest.approx(setup.lever)
+    creep = library(bench, ["joint_creep"])[0]
+    acts = describe(bench, Part(creep, 1.0), np.ones(len(creep.columns)), np.eye(1)).acts
+    assert as_it_stands(bench, [acts]) is bench
+
+
+def test_a_mechanism_is_found_on_the_arm_as_it_stands() -> None:
+    data = off_and_rubbing()
+    engine = engine_of(data)
+    variants = library(engine.bench, ["pose_error", "joint_hysteresis"])
+    both = next(e for e in search(engine, variants).explanations if len(e.words) == 2)
+    rubs = next(p for p in both.parts if p.word == "joint_hysteresis")
+    assert STANDS in rubs.variant.info
+    assert rubs.variant.joint == JOINT
+    # in absolute units, beside the same pose, it is what was fitted; alone it is something else
+    fitted = fit(engine, both)
+    forms = [describe(engine.bench, p, *fitted.of(i)) for i, p in enumerate(both.parts)]
+    mine = next(f for f in forms if f.word == "joint_hysteresis")
+    own = fitted.contribution(engine, both.parts.index(rubs))
+    assert mine.law.constants[AS_IT_STANDS]
+    size = np.abs(own).max()
+    assert np.abs(realise(engine.bench, mine, forms) - own).max() < 0.02 * size
+    assert np.abs(realise(engine.bench, mine) - own).max() > 0.1 * size
+
+
+@pytest.mark.parametrize("word", sorted(IN_JOINTS))
+def test_the_law_of_a_mechanism_there_is_one_of_the_torques_there(word: str) -> None:
+    """On every bench, beside the same pose; by no other is it what the variant is."""
+    bench = make_bench(arm_data())
+    tool = labelled(bench, "pose_error", "tool 150 mm")
+    pose = describe(bench, Part(tool, 1.0), OFFSET, np.eye(3))
+    stands = partial(as_it_stands, acts=[pose.acts])
+    found = next(v for v in EFFECTS[word].variants(stands(bench)) if v.joint == JOINT)
+    part = Part(found.known_by(", there", **{STANDS: stands}), 1.0)
+    k = len(found.columns)
+    form = describe(bench, part, np.ones(k), np.eye(k))
+    own = sum(bench.columns[c] for c in found.columns)
+    close = 0.01 * np.abs(own).max()
+    assert np.abs(realise(bench, form, [pose, form]) - own).max() < close
+    assert np.abs(realise(bench, form) - own).max() > close
+
+
+def test_none_is_looked_for_where_nothing_turns_the_load_or_nothing_is_left() -> None:
+    data = off_and_rubbing()
+    engine = engine_of(data)
+    shapes = [
+        labelled(engine.bench, "pose_error", "tool 150 mm"),
+        next(v for v in library(engine.bench, ["joint_hysteresis"]) if v.joint == JOINT),
+        library(engine.bench, ["thermal_drift"])[0],
+    ]
+    tool, rubs, warms = (Part(v, v.scales[0]) for v in shapes)
+    left = Explanation((tool, rubs), 0.0, float(ETAS[2]), (0.0, 0.0), 0.0)
+    assert acting_anew(engine, left)
+    assert acting_anew(engine, replace(left, eta=0.0)) == []
+    assert acting_anew(engine, replace(left, parts=(warms, rubs))) == []
+    assert acting_anew(engine, replace(left, parts=(tool, warms))) == []
