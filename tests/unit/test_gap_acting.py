@@ -27,7 +27,7 @@ from identification.gap.model.variants import Variant
 from identification.gap.search.acting import acting_anew
 from identification.gap.search.search import search
 from identification.gap.search.through import through_springs_anew
-from identification.gap.words import IN_JOINTS
+from identification.gap.words import IN_JOINTS, NAMELESS
 from tests.unit.test_gap_forms import arm_data
 
 ETAS = np.array([0.0, 1e-6, 4e-6, 2e-5])
@@ -96,6 +96,10 @@ def test_springs_are_found_anew_beside_another_effect_where_more_than_noise_is_l
     compliance = again[0].info["compliance"]
     assert compliance[WEAK] / data.compliance[WEAK] == pytest.approx(SOFTER[WEAK], rel=0.03)
     assert through_springs_anew(engine, replace(left, eta=0.0)) == []
+    # nor what no word names, which goes through nothing
+    nameless = (replace(shapes[0], word=w) for w in NAMELESS)
+    strange = [(Part(v, parts[0].scale), parts[1]) for v in nameless]
+    assert all(through_springs_anew(engine, replace(left, parts=p)) == [] for p in strange)
     # what is there already is not found once more
     parts = (Part(again[0], parts[0].scale), parts[1])
     assert through_springs_anew(engine, replace(left, parts=parts)) == []

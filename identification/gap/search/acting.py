@@ -28,16 +28,16 @@ def acting_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
     mine = [p for p in parts if p.word in IN_JOINTS]
     if len(parts) != _TWO or len(mine) != 1 or not explanation.eta > 0 or not bench.data.arm:
         return []
-    acts, fitted = [], fit(engine, explanation)
-    for i, other in enumerate(parts):
-        if other is not mine[0]:
-            law, scale = EFFECTS[other.word].laws.of(bench, other.variant)
-            acts.append(Acts(law, scale * fitted.of(i)[0]))
-    if bench.imposed or not any(turns_load(a.law) for a in acts):
+    other = next(p for p in parts if p is not mine[0])
+    if bench.imposed or other.word not in EFFECTS:
         return []
-    stands = partial(as_it_stands, acts=acts)
+    law, scale = EFFECTS[other.word].laws.of(bench, other.variant)
+    if not turns_load(law):
+        return []
+    values = scale * fit(engine, explanation).of(parts.index(other))[0]
+    stands = partial(as_it_stands, acts=[Acts(law, values)])
     with engine.on(stands(bench)):
-        found = _shapes(engine, mine[0], next(p for p in parts if p is not mine[0]))
+        found = _shapes(engine, mine[0], other)
     return [v.known_by(_WHERE, **{STANDS: stands}) for v in found]
 
 

@@ -22,9 +22,10 @@ def through_springs_anew(engine: Engine, explanation: Explanation) -> list[Varia
     is found with the springs anyway (`standing_anew`)."""
     bench, out = engine.bench, []
     for part in explanation.parts if explanation.eta > 0 else ():
-        laws = EFFECTS[part.word].laws
-        if not laws.through_springs or part.word == pose_error.WORD:
+        effect = EFFECTS.get(part.word)  # a trouble that no word names has none
+        if effect is None or not effect.laws.through_springs or part.word == pose_error.WORD:
             continue
+        laws = effect.laws
         rest = tuple(p for p in explanation.parts if p is not part)
         compliance = springs_found(laws, engine, part, rest, explanation.eta)
         before = part.variant.info.get("compliance", bench.compliance)
