@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.gap.effects import base_slip, contact_seating, joint_creep, time_lag
+from identification.gap.effects import base_slip, contact_seating, joint_creep
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
-from identification.gap.laws import lost_motion
+from identification.gap.laws import lags, lost_motion
 from identification.gap.laws.friction_law import FRICTION_LAWS, GROWS, SLIP_AT_A_STRENGTH
 from identification.gap.laws.law import (
     ACROSS,
@@ -69,7 +69,7 @@ CONSTANTS: dict[str, Key] = {
     "kind": Key("kind", "text", options=(*lost_motion.KINDS, *lost_motion.UNEVEN)),
     "tool": Key("tool_kg"),
     "preload": Key("preload_Nm"),
-    "way": Key("kind", "text", options=(*time_lag.KINDS, "window")),
+    "way": Key("kind", "text", options=(*lags.KINDS, "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
     "saturates": Key("saturates_at_Nm", "positive"),
     "channel": Key("channel", "text", options=("displacement", "force")),
@@ -86,7 +86,7 @@ CONSTANTS: dict[str, Key] = {
     "only_in": Key("only_in_pose", "text"),
     "unread": Key("joint_readings_do_not_show_it", "flag"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
-    AS_IT_STANDS: Key("on_the_arm_as_it_stands", "flag"),
+    AS_IT_STANDS: Key("answers_to_the_other_effects", "flag"),
 }
 SHAPES: dict[str, Key] = {
     "threshold": Key("threshold_Nm", "positive"),
@@ -228,7 +228,9 @@ GRAMMAR: dict[str, Grammar] = {
         ("joint", "memory", "flow_time", "flow_exponent", AS_IT_STANDS),
         (*_PLAYS, ("compliance", ())),
     ),
-    "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
+    "base_slip": Grammar(
+        ("axis", "depth", "memory", "flow_time", "flow_exponent", AS_IT_STANDS), _PLAYS
+    ),
     "joint_hysteresis": Grammar(
         ("joint", "law", "memory", "measured_to", "saturates", "tool", AS_IT_STANDS),
         (

@@ -19,6 +19,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.as_it_stands import as_it_stands
+from identification.gap.laws.lags import ahead_of_reading
 from identification.gap.laws.law import AS_IT_STANDS, STANDS
 from identification.gap.laws.springs_found import springs_found
 from identification.gap.model.base import base_columns, prediction
@@ -147,6 +148,16 @@ def test_levers_and_torques_are_those_of_the_arm_as_it_stands() -> None:
         along = setup.lever * bench.true_load[mine]
         assert pulled.true_torque[mine] == pytest.approx(along + aside)
         assert pulled.lever[mine] == pytest.approx(setup.lever)
+    late = labelled(bench, "time_lag", "force filter 5.2 s")
+    form = describe(bench, Part(late, 1.0), np.array([0.8]), np.eye(1))
+    behind = as_it_stands(bench, [form.acts])
+    more = 0.8 * ahead_of_reading(bench, "filter", 5.2)
+    assert np.abs(more).max() > 1
+    assert behind.true_load == pytest.approx(bench.true_load + more)
+    assert behind.true_torque == pytest.approx(bench.lever * behind.true_load[:, None])
+    shown = labelled(bench, "time_lag", "displacement filter 5.2 s")
+    acts = describe(bench, Part(shown, 1.0), np.ones(1), np.eye(1)).acts
+    assert as_it_stands(bench, [acts]) is bench
     creep = library(bench, ["joint_creep"])[0]
     acts = describe(bench, Part(creep, 1.0), np.ones(len(creep.columns)), np.eye(1)).acts
     assert as_it_stands(bench, [acts]) is bench

@@ -9,8 +9,8 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import CYCLE, GapData
-from identification.gap.effects.time_lag import late as lagged
 from identification.gap.laws.in_swing import steady_way
+from identification.gap.laws.lags import late as lagged
 from identification.gap.model.bench import make_bench
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data

@@ -19,13 +19,14 @@ from identification.gap.answer.posterior import (
 )
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import run_seconds
-from identification.gap.effects.time_lag import closest_lag, late
+from identification.gap.effects.time_lag import closest_lag
 from identification.gap.evidence.alike import level_covariance
 from identification.gap.evidence.engine import HOLD_PART, ROW_PART, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.interval import NOMINAL, Parameter, Softer
+from identification.gap.laws.lags import late
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine

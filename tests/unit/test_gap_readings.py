@@ -9,12 +9,12 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.effects import library
-from identification.gap.effects.time_lag import late
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.interval import Parameter
+from identification.gap.laws.lags import late
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant

@@ -10,9 +10,9 @@ import pytest
 from identification.arrays import Array
 from identification.gap.effects import library, time_lag
 from identification.gap.effects.joint_backlash import variants as plays
-from identification.gap.effects.time_lag import late
 from identification.gap.evidence.compare import by_word, closest, marginal, score
 from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.laws.lags import late
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.search.refine import refine

@@ -66,7 +66,7 @@ class Bench:
     time and response about it.
     columns: the pool, filled by the effects. moves (n,) m: what instruments of the response read,
     where more is known of it than a straight line. aside (n, m) Nm: torques beside those of the
-    load along the direction, of an arm that is known to stand otherwise than simulated.
+    load along the direction, and ahead (n,) N: load beyond what was read, where these are known.
     """
 
     data: GapData
@@ -91,6 +91,7 @@ class Bench:
     moves: Array | None = None
     known: KnownEffects | None = None
     aside: Array | None = None
+    ahead: Array | None = None
     # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
     lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 
@@ -159,8 +160,9 @@ class Bench:
 
     @cached_property
     def true_load(self) -> Array:
-        """(n,) N: the load without the drift of its reading."""
-        return np.asarray(self.load - self.zero_line)
+        """(n,) N: the load without the drift and the lag of its reading."""
+        read = self.load - self.zero_line
+        return np.asarray(read if self.ahead is None else read + self.ahead)
 
     @cached_property
     def true_torque(self) -> Array:
@@ -295,16 +297,18 @@ class Bench:
             object.__setattr__(out, name, value)
         return out
 
-    def standing(self, lever: Array, aside: Array) -> Bench:
-        """The bench of an arm with these levers (n, m) m, and torques aside (n, m) Nm; what is
-        known of it else stays, and its pool."""
+    def standing(self, lever: Array, aside: Array, ahead: Array) -> Bench:
+        """The bench of an arm with these levers (n, m) m, torques aside (n, m) Nm, and load (n,) N
+        ahead of its reading; what is known of it else stays, and its pool."""
         out = copy(self)
-        for known in ("true_torque", "likelier_joints"):
+        for known in ("true_load", "true_torque", "likelier_joints"):
             out.__dict__.pop(known, None)
         torque = lever * self.load[:, None] + aside
-        values = {"lever": lever, "aside": aside, "torque": torque, "flows": {}, "lags": {}}
+        values = {"lever": lever, "aside": aside, "ahead": ahead, "torque": torque}
         for name, value in {**values, "elastic": torque * self.compliance}.items():
             object.__setattr__(out, name, value)
+        for name in ("flows", "lags"):
+            object.__setattr__(out, name, {})
         return out
 
     def plays(

@@ -1,17 +1,20 @@
-"""Mechanisms on the arm as it stands: beside a wrong pose, or a load across, joints carry other
-torques than simulated, and move the target by other levers."""
+"""Mechanisms on the arm as it stands and is loaded: beside a wrong pose, a load across or a force
+that is read late, they answer to other torques than simulated, and move the target by other
+levers."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from identification.gap.effects import EFFECTS
+import numpy as np
+
+from identification.gap.effects import EFFECTS, base_slip
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import fit
-from identification.gap.laws.as_it_stands import Acts, as_it_stands, turns_load
+from identification.gap.laws.as_it_stands import Acts, as_it_stands, changes_torques
 from identification.gap.laws.closer import Word, evidence
 from identification.gap.laws.law import STANDS
 from identification.gap.model.variants import Variant, place_of
@@ -21,27 +24,31 @@ _HOPELESS = 60.0  # nats below what there is: its finer shapes won't do better e
 
 
 def acting_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
-    """Variants of a joint's mechanism beside what turns the load, in an explanation of the two that
-    leaves more than noise: on the arm as it then stands, at the same place; the pool of the bench
-    holds their columns afterwards. None where nothing turns the load."""
+    """Variants of a mechanism beside what changes the torques that it answers to, in an explanation
+    of the two that leaves more than noise: on the arm as it then stands, at the same place; the
+    pool of the bench holds their columns afterwards. None where nothing changes these."""
     bench, parts = engine.bench, explanation.parts
-    mine = [p for p in parts if p.word in IN_JOINTS]
+    mine = [p for p in parts if p.word in _ANSWERS]
     if len(parts) != _TWO or len(mine) != 1 or not explanation.eta > 0 or not bench.data.arm:
         return []
     other = next(p for p in parts if p is not mine[0])
     if bench.imposed or other.word not in EFFECTS:
         return []
     law, scale = EFFECTS[other.word].laws.of(bench, other.variant)
-    if not turns_load(law):
+    if not changes_torques(law):
         return []
     values = scale * fit(engine, explanation).of(parts.index(other))[0]
     stands = partial(as_it_stands, acts=[Acts(law, values)])
-    with engine.on(stands(bench)):
+    there = stands(bench)
+    if mine[0].word not in IN_JOINTS and not np.any(there.true_load != bench.true_load):
+        return []
+    with engine.on(there):
         found = _shapes(engine, mine[0], other)
     return [v.known_by(_WHERE, **{STANDS: stands}) for v in found]
 
 
 _TWO = 2
+_ANSWERS = IN_JOINTS | {base_slip.WORD}  # of a base that slips, to the load; its levers are long
 _WHERE = ", on the arm as it stands"
 
 
