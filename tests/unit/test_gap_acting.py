@@ -79,6 +79,21 @@ def test_a_spring_that_only_what_pulls_across_shows_is_found_with_it() -> None:
     assert compliance[2:] == pytest.approx(data.compliance[2:], rel=0.03)
 
 
+def test_a_spring_beside_that_is_an_effect_itself_counts_as_well() -> None:
+    """Stated to a percent, the joint's own spring can't be off by so much."""
+    data = replace(arm_data(), compliance_relative_sd=np.full(6, 0.01))
+    there = make_bench(data, compliance=data.compliance * SOFTER)
+    across = labelled(there, "load_misalignment", "all directions")
+    w = np.array([0.0, -0.25, 0.15, -0.2])
+    seen = measured(data, there, sum(w[i] * there.columns[c] for i, c in enumerate(across.columns)))
+    engine = engine_of(seen)
+    springs = labelled(engine.bench, "joint_stiffness_error", f"joint {WEAK + 1}")
+    found = labelled(engine.bench, across.word, across.label)
+    pulls, off = (Part(v, v.scales[-1]) for v in (found, springs))
+    compliance = springs_found(EFFECTS[across.word].laws, engine, pulls, (off,), 0.0)
+    assert compliance[WEAK] / data.compliance[WEAK] == pytest.approx(SOFTER[WEAK], rel=0.03)
+
+
 def test_springs_are_found_anew_beside_another_effect_where_more_than_noise_is_left() -> None:
     data = arm_data()
     there = make_bench(data, compliance=data.compliance * SOFTER)

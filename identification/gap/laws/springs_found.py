@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, Ints
 from identification.gap.evidence.compare import closest, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
@@ -21,6 +21,7 @@ from identification.gap.explanations.explanation import conditioned
 from identification.gap.explanations.fit import weighed
 from identification.gap.laws.law import Laws
 from identification.gap.model.variants import Variant, block
+from identification.gap.words import SPRINGS
 
 _FAR = 0.1, 10.0  # of the simulated compliance: no spring is softer or stiffer by more
 _STEPS = 12  # at most: four are enough where they end anywhere
@@ -53,33 +54,51 @@ def springs_found(
     together with a part that goes through them, with an imperfection of eta m, beside other
     parts."""
     bench, base = engine.bench, engine.base
-    each, rest = _through_each(laws, engine, part.variant)
-    own, spring = list(base.springs), list(base.springs.values())
+    joints, places = _springs(engine, beside)
+    each, rest = _through_each(laws, engine, part.variant, joints)
     others = engine.columns(c for p in beside for c in p.variant.columns)
     root = block([np.diag(base.sd), *(p.root for p in beside), part.root])
-    softer, w = np.zeros(len(own)), np.zeros(len(part.variant.columns))
+    softer: Array = np.zeros(len(joints))
+    w = np.zeros(len(part.variant.columns))
     for _ in range(_STEPS):
         through = each @ w  # (springs, size) what each of them, as simulated, does to the part
-        columns = base.columns.copy()
-        columns[:, spring] += through.T
+        columns = np.hstack([base.columns, others])
+        columns[:, places[1]] += through[places[0]].T
         now = rest + np.tensordot(1 + softer, each, axes=1)
-        X = np.hstack([columns, others, now]) @ root
+        X = np.hstack([columns, now]) @ root
         precise = weighed(engine, X, eta)
         target = engine.target + softer @ through
         x = root @ np.linalg.solve(precise.T @ X + np.eye(len(root)), precise.T @ target)
-        last, softer = softer, np.clip(1 + x[spring], *_FAR) - 1
+        change = np.bincount(places[0], weights=x[places[1]], minlength=len(joints))
+        last, softer = softer, np.clip(1 + change, *_FAR) - 1
         w = x[len(x) - len(w) :]
         if np.abs(softer - last).max(initial=0.0) < _DONE:
             break
     out = bench.compliance.copy()
-    out[own] *= 1 + softer
+    out[joints] *= 1 + softer
     return out
 
 
-def _through_each(laws: Laws, engine: Engine, variant: Variant) -> tuple[Array, Array]:
-    """What a variant does through each spring of the base, as simulated (springs, size, k), and
-    through nothing of these (size, k): columns are linear in the compliance of each."""
-    bench, own = engine.bench, list(engine.base.springs)
+def _springs(engine: Engine, beside: tuple[Part, ...]) -> tuple[list[int], Ints]:
+    """Joints whose springs may be others; and of every coefficient that says so, of the base and of
+    parts, which of these it is of and which column it has (2, c)."""
+    found = list(engine.base.springs.items())
+    first = engine.base.columns.shape[1]
+    for p in beside:
+        if p.word == SPRINGS:
+            found += [(j, first + k) for k, j in enumerate(p.variant.joints)]
+        first += len(p.variant.columns)
+    joints = sorted({j for j, _ in found})
+    places = [(joints.index(j), column) for j, column in found]
+    return joints, np.array(places, dtype=int).reshape(-1, 2).T
+
+
+def _through_each(
+    laws: Laws, engine: Engine, variant: Variant, joints: list[int]
+) -> tuple[Array, Array]:
+    """What a variant does through the spring of each of these joints, as simulated (springs, size,
+    k), and through nothing of these (size, k): columns are linear in the compliance of each."""
+    bench = engine.bench
     law, scale = laws.of(bench, variant)
 
     def through(compliance: Array) -> Array:
@@ -87,8 +106,8 @@ def _through_each(laws: Laws, engine: Engine, variant: Variant) -> tuple[Array, 
         return laws.rows(bench, replace(law, constants=about)) * scale
 
     kept = bench.compliance.copy()
-    kept[own] = 0.0
+    kept[joints] = 0.0
     rest = through(kept)
-    alone = [np.where(np.arange(len(kept)) == j, bench.compliance, kept) for j in own]
+    alone = [np.where(np.arange(len(kept)) == j, bench.compliance, kept) for j in joints]
     each = np.array([through(c) - rest for c in alone])
-    return each.reshape(len(own), *rest.shape), rest
+    return each.reshape(len(joints), *rest.shape), rest
