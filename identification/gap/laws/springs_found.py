@@ -70,7 +70,7 @@ def springs_found(
         target = engine.target + softer @ through
         x = root @ np.linalg.solve(precise.T @ X + np.eye(len(root)), precise.T @ target)
         change = np.bincount(places[0], weights=x[places[1]], minlength=len(joints))
-        last, softer = softer, np.clip(1 + change, *_FAR) - 1
+        last, softer = softer, np.asarray(np.clip(1 + change, *_FAR) - 1, dtype=float)
         w = x[len(x) - len(w) :]
         if np.abs(softer - last).max(initial=0.0) < _DONE:
             break
