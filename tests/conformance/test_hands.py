@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from identification.arrays import Array, Flags
 from identification.gap.data import GapData
 from identification.gap.evidence.imperfection import PATH
 from identification.gap.evidence.parts import Part
@@ -20,7 +21,7 @@ from identification.gap.judging.hands import acts_by_hands_alone, open_to_hands
 from identification.gap.model.bench import make_bench
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.effect_benches import of, quick_engine
-from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy
+from tests.conformance.gap_designs import DESIGNS, TRUE, imported, meta, noisy
 from tests.conformance.test_effect_recovery import typical
 from tests.explained import explained
 
@@ -98,14 +99,25 @@ def test_what_acts_at_other_levels_too_is_a_law(monkeypatch: pytest.MonkeyPatch)
     load = bench.load
 
     def of_rows(gone: Array) -> SimpleNamespace:
-        rows = replace(bench.rows, overshoot=gone)
-        return SimpleNamespace(bench=SimpleNamespace(rows=rows, load=load))
+        rows, layout = replace(bench.rows, overshoot=gone), bench.layout
+        return SimpleNamespace(bench=SimpleNamespace(rows=rows, load=load, layout=layout))
 
     engine = of_rows(gone)
 
-    def alone(moved: Array, parts: tuple[int, ...] = (0,)) -> bool:
-        fitted = SimpleNamespace(contribution=lambda *_: moved)
-        monkeypatch.setattr(hands, "fit", lambda *_: fitted)
+    def alone(
+        moved: Array,
+        parts: tuple[int, ...] = (0,),
+        elsewhere: Array | None = None,
+        sd: float = 1.0,
+    ) -> bool:
+        """elsewhere: what the other holds alone say of it, a coefficient of 1 and its sd."""
+        w = np.ones(1), np.full((1, 1), sd**2)
+
+        def fitted(_: object, __: object, keep: Flags | None = None) -> SimpleNamespace:
+            does = moved if keep is None or elsewhere is None else elsewhere
+            return SimpleNamespace(contribution=lambda *_: does, of=lambda _: w)
+
+        monkeypatch.setattr(hands, "fit", fitted)
         best = SimpleNamespace(parts=parts)
         found = SimpleNamespace(engine=engine, explanations=(best,))
         return acts_by_hands_alone(cast(SearchResult, found))
@@ -115,6 +127,13 @@ def test_what_acts_at_other_levels_too_is_a_law(monkeypatch: pytest.MonkeyPatch)
     assert not alone(signs * there, parts=())
     assert not alone(signs * (there + 1.0))
     assert not alone(signs)
+    # nor where the others say the same of it, for sure
+    both = signs * (there + 0.2)
+    assert alone(both)
+    assert not alone(both, sd=0.05)
+    assert not alone(both, elsewhere=1.1 * both, sd=0.05)
+    assert alone(both, elsewhere=1.5 * both, sd=0.05)
+    assert alone(signs * there, sd=0.05)
     large = load > 0.7 * load.max()
     engine = of_rows(np.where(np.isin(np.arange(rows.n), edges) & large, 0.1, 0.0))
     assert not alone(load**3)  # as any law it acts at large loads

@@ -16,8 +16,9 @@ from identification.arrays import Array
 from identification.gap.effects import time_lag
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import PATH
-from identification.gap.explanations.explanation import SearchResult
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.recording.rows import Rows
 
 
 def open_to_hands(engine: Engine, fitted: Fit) -> Array:
@@ -31,7 +32,8 @@ def open_to_hands(engine: Engine, fitted: Fit) -> Array:
 def acts_by_hands_alone(found: SearchResult) -> bool:
     """Whether the largest effect of the best explanation does most of what it does (in squares,
     about the mean of each setup) in the holds beyond which a load went that nobody read, and far
-    more of it than the load has there: any law does most at large ones."""
+    more of it than the load has there: any law does most at large ones. Not where the other holds
+    alone say the same of it."""
     engine, best = found.engine, found.explanations[0]
     if not best.parts:
         return False
@@ -39,7 +41,32 @@ def acts_by_hands_alone(found: SearchResult) -> bool:
     moved = fit(engine, best).contribution(engine, 0)[: rows.n]
     both = rows.about_means(np.column_stack([moved, engine.bench.load])) ** 2
     share, load = both[rows.gone_beyond].sum(axis=0) / np.maximum(both.sum(axis=0), _TINY)
-    return bool(share > max(_MOST, _MORE * load))
+    return bool(share > max(_MOST, _MORE * load)) and not _same_elsewhere(engine, best)
 
 
 _MOST, _MORE, _TINY = 0.5, 2.0, 1e-300
+
+
+def _same_elsewhere(engine: Engine, explanation: Explanation) -> bool:
+    """Whether the holds that no load went beyond show the largest effect for sure, and do as much
+    to themselves by it as all holds together have it."""
+    rows = engine.bench.rows
+    keep = np.ones(engine.bench.layout.size, dtype=bool)
+    keep[: rows.n] = ~rows.gone_beyond
+    alone, whole = fit(engine, explanation, keep), fit(engine, explanation)
+    w, covariance = alone.of(0)
+    if w @ np.linalg.lstsq(covariance, w, rcond=None)[0] < _SURE:
+        return False
+    does, more = (_there(rows, f.contribution(engine, 0)[: rows.n]) for f in (alone, whole))
+    return bool(rows.rms(more - does) < _ALIKE * rows.rms(does))
+
+
+def _there(rows: Rows, moved: Array) -> Array:
+    """(n,) what moved in the holds that no load went beyond, about its mean there in each setup; 0
+    in the others."""
+    counts = np.where(rows.gone_beyond, 0.0, rows.weight)
+    mean = np.bincount(rows.setup, counts * moved) / np.maximum(np.bincount(rows.setup, counts), 1)
+    return np.where(rows.gone_beyond, 0.0, moved - mean[rows.setup])
+
+
+_SURE, _ALIKE = 100.0, 0.2  # squares of standard deviations; of what they do
