@@ -20,11 +20,11 @@ from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.as_it_stands import as_it_stands
 from identification.gap.laws.lags import ahead_of_reading
-from identification.gap.laws.law import AS_IT_STANDS, STANDS
+from identification.gap.laws.law import AS_IT_STANDS
 from identification.gap.laws.springs_found import springs_found
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import STANDS, Variant
 from identification.gap.search.acting import acting_anew
 from identification.gap.search.search import search
 from identification.gap.search.through import through_springs_anew

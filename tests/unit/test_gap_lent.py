@@ -13,7 +13,7 @@ from identification.gap.model.variants import Variant, variant
 from identification.gap.search import search
 from tests.unit.test_gap_earned import BUMP, REPETITIONS, engine
 
-LAW, BESIDE, NEARLY = "contact_seating", "zero_shift", "load_misalignment"
+LAW, BESIDE, NEARLY = "contact_seating", "zero_shift", "base_compliance"
 
 
 def setting() -> tuple[Engine, dict[str, Variant]]:

@@ -22,7 +22,6 @@ from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import NOMINAL, Coefficients, Parameter, Softer
-from identification.gap.laws.law import STANDS
 from identification.gap.model.bench import Bench
 
 
@@ -31,6 +30,6 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
     coefficients and their covariance; softer: what the springs turned out to be."""
-    v, stands = part.variant, part.variant.info.get(STANDS)
+    stands = part.variant.stands
     there = bench if stands is None else stands(bench)
-    return EFFECTS[part.word].parameters(there, v, Coefficients(w, cov, softer))
+    return EFFECTS[part.word].parameters(there, part.variant, Coefficients(w, cov, softer))

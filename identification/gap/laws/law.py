@@ -37,7 +37,6 @@ class Law:
 
 AS_THEY_ARE = "springs as they are"
 AS_IT_STANDS = "as_it_stands"  # a constant: of the torques on the arm as it stands (`as_it_stands`)
-STANDS = "stands"  # in `info` of such a variant: that arm's bench, from the simulated one's
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class Laws:
 
         Raises ValueError for a variant that says too little of itself.
         """
-        stands = variant.info.get(STANDS)
+        stands = variant.stands
         try:
             law, scale = self.describe(bench if stands is None else stands(bench), variant)
         except KeyError as missing:

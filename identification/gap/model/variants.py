@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
@@ -18,6 +18,7 @@ LASTING = " lasting"  # one that outlasts the arm's way to another pose
 TAKEN_BACK = " taken back"  # one that is lost between runs
 SET_UP_ANEW = " set up anew"  # one that is lost when the rig is turned to another direction
 
+STANDS = "stands"  # in `info`: where it acts, if not on the simulated arm
 CALLED = "called"  # in `info`: what a place and a memory are called, with which labels begin
 WARMS_UP = "T "  # a path in time of one rate is called so, and by its share of the session
 
@@ -56,6 +57,16 @@ class Variant:
     def joint(self) -> int | None:
         """The one joint (from 0) that it sits in; None of what sits in several, or in none."""
         return self.info.get("joint")
+
+    @property
+    def about(self) -> Array | None:
+        """(m,) compliance of the springs that it goes through, if these are not those simulated."""
+        return self.info.get("compliance")
+
+    @property
+    def stands(self) -> Callable[[Any], Any] | None:
+        """From the simulated arm's bench to that on which it acts, if that is another one."""
+        return self.info.get(STANDS)
 
     @property
     def joints(self) -> tuple[int, ...]:

@@ -16,8 +16,7 @@ from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.as_it_stands import Acts, as_it_stands, changes_torques
 from identification.gap.laws.closer import Word, evidence
-from identification.gap.laws.law import STANDS
-from identification.gap.model.variants import Variant, place_of
+from identification.gap.model.variants import STANDS, Variant, place_of
 from identification.gap.words import IN_JOINTS
 
 _HOPELESS = 60.0  # nats below what there is: its finer shapes won't do better either

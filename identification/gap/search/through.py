@@ -28,7 +28,8 @@ def through_springs_anew(engine: Engine, explanation: Explanation) -> list[Varia
         laws = effect.laws
         rest = tuple(p for p in explanation.parts if p is not part)
         compliance = springs_found(laws, engine, part, rest, explanation.eta)
-        before = part.variant.info.get("compliance", bench.compliance)
+        about = part.variant.about
+        before = bench.compliance if about is None else about
         if np.abs(compliance / before - 1).max() > _MOVED:
             again = laws.about_springs(bench, part.variant, compliance)
             out.append(again.known_by(_beside(rest), beside=_beside(rest)))
