@@ -27,7 +27,9 @@ class Setup:
     tangents (2, 3): unit vectors across the direction; tangent_lever (2, m): torques of a newton
     along them. offset_lever (m, 3): change of lever per metre of tool offset in the flange frame.
     turned_lever (m, m): change of lever i per radian of joint j. moment (3,) m: moment about the
-    base origin of a newton along the direction. links (2, l, 4) m/N: compliance along the
+    base origin of a newton along the direction. point (3,) m: of load, over the base; shifted_point
+    (3, 3): its change per metre of tool offset in the flange frame; turned_point (3, m): per radian
+    of every joint. links (2, l, 4) m/N: compliance along the
     direction of each nominal link by bending at its start, in its middle, at its end, and by twist,
     placed as the model has it, and from joint to joint. gravity (m,) Nm: torques of the arm's own
     weight; tool_gravity (m,) Nm/kg: of a mass at the point of load. outside m/N: compliance along
@@ -52,6 +54,9 @@ class Setup:
     bent_lever: Array | float = 0.0
     turned_offset: Array | float = 0.0
     outside: float = 0.0
+    point: Array | float = 0.0
+    shifted_point: Array | float = 0.0
+    turned_point: Array | float = 0.0
 
     @property
     def loads(self) -> Flags:

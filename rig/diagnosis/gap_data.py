@@ -311,6 +311,9 @@ def arm_setup(
         bent_lever=_bent(arm, q, tool, n),
         turned_offset=_turned_offset(axes, n) @ R,
         outside=0.0 if model is None else model.outside(q, tool, n),
+        point=point,
+        shifted_point=R,
+        turned_point=J,
     )
 
 

@@ -277,7 +277,7 @@ GRAMMAR: dict[str, Grammar] = {
     "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
     "link_flexibility": Grammar(("placed",), (("over_nominal", ("segment", "strain")),)),
     "base_compliance": Grammar(
-        ("depth",),
+        ("depth", AS_IT_STANDS),
         (("compliance", ("axis",)), ("compliance_xy", ()), ("compliance", ("axis", "beyond"))),
     ),
     "contact_seating": Grammar(

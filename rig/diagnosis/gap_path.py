@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, Ints
-from identification.gap.answer.forms import Form, realise
+from identification.gap.answer.forms import Form, realise, where_it_acts
 from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects import EFFECTS
 from identification.gap.laws.law import along, in_pose
@@ -218,7 +218,8 @@ def _beyond(bench: Bench, forms: Sequence[Form]) -> tuple[str, ...]:
     for f in forms:
         seen = f.law.constants.get("measured_to")
         if seen is not None:
-            top = float(np.abs(bench.torque[:, f.law.constants["joint"]]).max())
+            there = where_it_acts(bench, f.law, forms)
+            top = float(np.abs(there.torque[:, f.law.constants["joint"]]).max())
             if top > 1.02 * seen:
                 out.append(
                     f"{f.word}: seen to {seen:.4g} Nm at joint {f.law.constants['joint'] + 1}, "

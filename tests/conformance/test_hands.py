@@ -114,6 +114,10 @@ def test_what_acts_at_other_levels_too_is_a_law(monkeypatch: pytest.MonkeyPatch)
         w = np.ones(1), np.full((1, 1), sd**2)
 
         def fitted(_: object, __: object, keep: Flags | None = None) -> SimpleNamespace:
+            if keep is not None:  # of what is read hold by hold, too
+                np.testing.assert_array_equal(keep[: rows.n], ~there)
+                held = keep[bench.layout.q].reshape(bench.data.joints, -1)
+                np.testing.assert_array_equal(held, np.tile(~there[edges], (len(held), 1)))
             does = moved if keep is None or elsewhere is None else elsewhere
             return SimpleNamespace(contribution=lambda *_: does, of=lambda _: w)
 

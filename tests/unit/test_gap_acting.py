@@ -3,6 +3,7 @@ turns the load. Both are products of two unknowns."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import partial
 
@@ -11,13 +12,15 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.answer.forms import describe, realise
+from identification.gap.answer.known import knowing
 from identification.gap.data import GapData
-from identification.gap.effects import EFFECTS, library
+from identification.gap.effects import EFFECTS, base_compliance, base_slip, library
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
+from identification.gap.explanations.several import family_of
 from identification.gap.laws.as_it_stands import as_it_stands
 from identification.gap.laws.lags import ahead_of_reading
 from identification.gap.laws.law import AS_IT_STANDS
@@ -28,7 +31,9 @@ from identification.gap.model.variants import STANDS, Variant
 from identification.gap.search.acting import acting_anew
 from identification.gap.search.search import search
 from identification.gap.search.through import through_springs_anew
+from identification.gap.search.unseen import _Columns
 from identification.gap.words import IN_JOINTS, NAMELESS
+from rig.diagnosis.gap_forms import from_entry, to_entry
 from tests.unit.test_gap_forms import arm_data
 
 ETAS = np.array([0.0, 1e-6, 4e-6, 2e-5])
@@ -178,6 +183,36 @@ def test_levers_and_torques_are_those_of_the_arm_as_it_stands() -> None:
     assert as_it_stands(bench, [acts]) is bench
 
 
+def test_moments_about_the_base_are_those_of_the_arm_as_it_stands() -> None:
+    """About the upright axis those of the first joint, which it is; about lying ones by hand."""
+    data = arm_data(directions="xyz")
+    bench = make_bench(data)
+    tool = labelled(bench, "pose_error", "tool 150 mm")
+    across = labelled(bench, "load_misalignment", "all directions")
+    w = np.linspace(-0.2, 0.2, len(across.columns))
+    forms = [
+        describe(bench, Part(tool, 1.0), OFFSET, np.eye(3)),
+        describe(bench, Part(across, 1.0), w, np.eye(len(w))),
+    ]
+    stands = as_it_stands(bench, [f.acts for f in forms])
+    assert base_slip.lever_of(stands, "z", 0.0) == pytest.approx(stands.lever[:, 0])
+    assert base_slip.moment_of(stands, "z", 0.0) == pytest.approx(stands.true_torque[:, 0])
+    there, depth = stands.stands, 0.3
+    assert there is not None
+    for s, setup in enumerate(data.setups):
+        mine = np.flatnonzero(bench.rows.setup == s)[5]
+        load = bench.load[mine]
+        point = setup.point + setup.shifted_point @ OFFSET + np.array([0.0, 0.0, depth])
+        lever = np.cross(point, setup.unit_vector)
+        assert base_compliance.moments(stands, depth)[mine] == pytest.approx(lever)
+        # what pulls across acts where the tool was taken to be: its own change is of second order
+        nominal = setup.point + np.array([0.0, 0.0, depth])
+        moment = lever * load + np.cross(nominal, there.force[mine])
+        carried = base_compliance.moments_of_load(stands, depth, bench.load)[mine]
+        assert carried == pytest.approx(moment)
+        assert np.abs(there.force[mine] @ setup.unit_vector) < 1e-9 * load
+
+
 def test_a_mechanism_is_found_on_the_arm_as_it_stands() -> None:
     data = off_and_rubbing()
     engine = engine_of(data)
@@ -195,6 +230,75 @@ def test_a_mechanism_is_found_on_the_arm_as_it_stands() -> None:
     size = np.abs(own).max()
     assert np.abs(realise(engine.bench, mine, forms) - own).max() < 0.02 * size
     assert np.abs(realise(engine.bench, mine) - own).max() > 0.1 * size
+    # and where a hand is looked for that went too far, it is the same
+    rows = engine.bench.rows
+    beyond = _Columns(engine.bench, rubs, np.where(rows.hold_starts, 1.0, 0.0))
+    columns = beyond.along(rows.overshoot) @ fitted.of(both.parts.index(rubs))[0]
+    assert np.abs(columns - own).max() < 1e-9 * size
+    # a file says so
+    entry = to_entry(mine, {"name": mine.word})
+    assert entry["answers_to_the_other_effects"]
+    again = from_entry(json.loads(json.dumps(entry)))
+    assert realise(engine.bench, again, forms) == pytest.approx(
+        realise(engine.bench, mine, forms), rel=1e-6, abs=1e-15
+    )
+    known = knowing(engine.bench, forms).known
+    assert known is not None
+    both_do = sum(realise(engine.bench, f, forms) for f in forms)
+    n, setup = rows.n, rows.setup
+    datum = np.array([both_do[np.argmax(setup == s)] for s in range(int(setup.max()) + 1)])
+    assert known.does[:n] == pytest.approx(both_do[:n] - datum[setup], abs=1e-12)
+
+
+def test_it_stands_beside_what_has_the_arm_so_alone() -> None:
+    data = off_and_rubbing()
+    engine = engine_of(data)
+    words = ["pose_error", "joint_hysteresis", "thermal_drift", "joint_creep", "zero_shift"]
+    found = search(engine, library(engine.bench, words))
+    made = [v for v in found.variants if v.answers_to is not None]
+    assert {(v.word, v.answers_to) for v in made} == {("joint_hysteresis", "pose_error")}
+    for e in found.explanations:
+        for part in e.parts:
+            assert part.variant.answers_to in {None, *e.words}
+    thermal = next(v for v in found.variants if v.word == "thermal_drift")
+    tool = next(v for v in found.variants if v.word == "pose_error")
+    for v, able in ((thermal, False), (tool, True)):
+        family = family_of(found.variants, "joint_hysteresis", (Part(v, v.scales[0]),))
+        assert (made[0] in family) is able
+
+
+def test_caches_of_variants_are_of_one_bench() -> None:
+    engine = engine_of(arm_data())
+    v = labelled(engine.bench, "joint_stiffness_error", f"joint {JOINT + 1}")
+    creep = next(v for v in library(engine.bench, ["joint_creep"]) if v.joint == JOINT)
+    before = score(engine, engine.levels, [v, creep])
+    there = as_it_stands(
+        engine.bench,
+        [
+            describe(
+                engine.bench,
+                Part(labelled(engine.bench, "pose_error", "tool 150 mm"), 1.0),
+                OFFSET,
+                np.eye(3),
+            ).acts
+        ],
+    )
+    with engine.on(there):
+        assert engine.bench is there
+        inside = score(engine, engine.levels, [v, creep])
+    assert [s.log_evidence for s in score(engine, engine.levels, [v, creep])] == [
+        s.log_evidence for s in before
+    ]
+    assert inside[1].log_evidence != before[1].log_evidence  # likelier where it gives more
+
+
+def test_a_lag_of_the_laser_goes_through_no_spring() -> None:
+    engine = engine_of(arm_data())
+    late = labelled(engine.bench, "time_lag", "displacement filter 1.25 s")
+    creep = next(v for v in library(engine.bench, ["joint_creep"]) if v.joint == JOINT)
+    parts = Part(late, 1.0), Part(creep, 0.1)
+    left = Explanation(parts, 0.0, float(ETAS[2]), (0.0, 0.0), 0.0)
+    assert through_springs_anew(engine, left) == []
 
 
 @pytest.mark.parametrize("word", sorted(IN_JOINTS))

@@ -284,6 +284,44 @@ def test_yield_along_a_path_is_its_closed_form(tmp_path: Path) -> None:
     assert "hold all" not in found.to_text()
 
 
+def test_a_yield_may_be_one_of_the_torques_beside_another_effect(tmp_path: Path) -> None:
+    """With the tool elsewhere joint 1 has another lever, by which it yields and moves the target;
+    and is seen up to another torque."""
+    offset_mm = {"x": 60.0, "y": -50.0, "z": 80.0}
+    about = [mm / 1e3 for mm in offset_mm.values()]
+    pose = {
+        "name": "pose_error",
+        "about_offset_m": about,
+        "about_angles_rad": [0.0] * 6,
+        "about_turn_rad": [0.0] * 3,
+        "terms": [{"axis": a, "offset_mm": mm} for a, mm in offset_mm.items()],
+    }
+    answers = {**YIELD, "answers_to_the_other_effects": True}
+    path = procedure(tmp_path)
+    with_yield, other = (simulate(model(tmp_path, e, pose), path) for e in (answers, YIELD))
+    plain = simulate(model(tmp_path, pose), path)
+    read = load_model(tmp_path / "model.yaml")
+    (setup,) = planned_data(read, load_protocol(path)).setups
+    lever = float(setup.lever[0] + setup.offset_lever[0] @ np.array(about))
+    assert abs(lever - setup.lever[0]) > 0.03
+    force, moved, _ = levels(with_yield, "loading", 1)
+    wanted = 1e-4 * lever * np.maximum(force * lever - 40, 0.0)
+    assert wanted.max() > 1e-4
+    np.testing.assert_allclose(moved - levels(plain, "loading", 1)[1], wanted, rtol=1e-3, atol=1e-8)
+    assert np.abs(levels(other, "loading", 1)[1] - moved).max() > 0.02 * wanted.max()
+    curve = {
+        "name": "joint_nonlinear_stiffness",
+        "joint": 1,
+        "measured_to_Nm": 1.01 * abs(lever) * 82,
+        "answers_to_the_other_effects": True,
+        "terms": [{"beyond_Nm": 5.0, "compliance_rad_per_Nm": 1e-6}],
+    }
+    assert abs(lever) > abs(setup.lever[0])  # else it would go beyond in neither
+    assert "goes on as it ended" not in simulate(model(tmp_path, curve, pose), path).to_text()
+    short = {**curve, "measured_to_Nm": 1.02 * abs(float(setup.lever[0])) * 82}
+    assert "goes on as it ended" in simulate(model(tmp_path, short, pose), path).to_text()
+
+
 def test_the_text_says_that_repetitions_are_left_out(tmp_path: Path) -> None:
     path = procedure(tmp_path)
     path.write_text(path.read_text().replace("repetitions: 2", "repetitions: 3"))

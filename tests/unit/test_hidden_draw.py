@@ -16,7 +16,8 @@ from rig.meta import Meta
 from rig.worlds.hidden import draw
 from rig.worlds.hidden.design import draw_plan
 from rig.worlds.hidden.draw import WORDS, HiddenCase, draw_case
-from rig.worlds.hidden.scene import make_scene
+from rig.worlds.hidden.effect import Effect
+from rig.worlds.hidden.scene import Scene, make_scene
 
 
 @pytest.fixture(scope="module")
@@ -194,3 +195,30 @@ def test_some_hands_turn_past_a_level_and_back() -> None:
     for before, at in zip(calm.sample[:-1], calm.sample[1:], strict=True):
         way = np.diff(calm.load[before : at + 1])
         assert np.all(way >= 0) or np.all(way <= 0)
+
+
+@pytest.mark.parametrize("first", ["pose_error", "load_misalignment"])
+def test_mechanisms_answer_to_the_torques_that_are_there(
+    first: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whichever of the two words is drawn first: what turns the load comes before what answers."""
+    seen: list[tuple[str, Scene]] = []
+    plain = draw._draw_effect
+
+    def drawn(scene: Scene, random: np.random.Generator, word: str, laws: str | None) -> Effect:
+        seen.append((word, scene))
+        return plain(scene, random, word, laws)
+
+    monkeypatch.setattr(draw, "_draw_effect", drawn)
+    case = draw_case(5, 2, word="joint_yield", second=first)
+    assert set(case.label["truth"]) == {"joint_yield", first}
+    (word, scene), (second, turned) = seen[-2:]
+    assert (word, second) == (first, "joint_yield")
+    assert scene.turned is None
+    assert turned.turned is not None
+    assert np.abs(turned.torque - scene.torque).max() > 0.5
+    np.testing.assert_array_equal(turned.elastic, scene.elastic)
+    if first == "pose_error":
+        assert np.abs(turned.point - scene.tool).max() > 1e-3
+    else:
+        assert np.abs(turned.force - scene.force).max() > 1.0

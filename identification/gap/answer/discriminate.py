@@ -33,7 +33,7 @@ from identification.gap.evidence.engine import Engine, NoiseLevel, eta_levels
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.laws.flows import make
-from identification.gap.laws.law import Law
+from identification.gap.laws.law import AS_IT_STANDS, Law
 from identification.gap.model.base import Base, base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
@@ -262,6 +262,7 @@ def _ahead(there: Bench, rivals: tuple[Rival, Rival]) -> None:
         flow = EFFECTS[r.word].laws.flow
         laws = [f.law for f in r.forms] + [law for _, law, *_ in r.shapes]
         laws += [law for _, law, _ in r.further]
+        laws = [law for law in laws if not law.constants.get(AS_IT_STANDS)]  # on other benches
         flows += [flow(there, law) for law in laws] if flow is not None else []
     make(there, flows)
 

@@ -55,9 +55,14 @@ def describe(bench: Bench, part: Part, w: Array, covariance: Array) -> Form:
 def rows_of(bench: Bench, word: str, law: Law, beside: Iterable[Form] = ()) -> Array:
     """(size, k): stacked columns of the law's terms on this bench, per SI unit. beside: effects of
     the same rig, which may change the torques that the law is of."""
-    if law.constants.get(AS_IT_STANDS):
-        bench = as_it_stands(bench, (form.acts for form in beside))
-    return EFFECTS[word].laws.rows(bench, law)
+    return EFFECTS[word].laws.rows(where_it_acts(bench, law, beside), law)
+
+
+def where_it_acts(bench: Bench, law: Law, beside: Iterable[Form]) -> Bench:
+    """The bench of the torques that a law is of: as effects beside it leave them, if it says so."""
+    if not law.constants.get(AS_IT_STANDS):
+        return bench
+    return as_it_stands(bench, (form.acts for form in beside))
 
 
 def realise(bench: Bench, form: Form, beside: Iterable[Form] = ()) -> Array:

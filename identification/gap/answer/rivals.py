@@ -17,7 +17,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult, conditioned
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.law import Law
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import Variant, able_beside
 
 _SHAPES = 8  # of each word, the best on the present data
 _WITHIN = 12.0  # nats below the best that a shape may lie
@@ -51,12 +51,13 @@ def rival_of(found: SearchResult, chosen: Explanation, first: str, word: str) ->
     fitted = fit(engine, explanation)
     described = [describe(engine.bench, p, *fitted.of(i)) for i, p in enumerate(explanation.parts)]
     part, *others = (p for p in explanation.parts if p.word == word)
-    beside = tuple(p for p in explanation.parts if p is not part)
+    rest = tuple(p for p in explanation.parts if p is not part)
+    able = able_beside(found.variants, {p.word for p in rest})
     return Rival(
         word,
         tuple(lawful(f) for f in described if f.word == word),
         engine.base.softer(fitted.base, engine.bench.data.joints),
-        _shapes(engine, [v for v in found.variants if v.word == word], part, beside),
+        _shapes(engine, [v for v in able if v.word == word], part, rest),
         tuple((p, *law_of(engine.bench, p.variant)) for p in others),
         tuple(lasting(f) for f in described if f.word != word),
         explanation.eta,

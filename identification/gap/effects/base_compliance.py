@@ -43,7 +43,22 @@ def moments(bench: Bench, depth: float) -> Array:
     for s in bench.data.setups:
         below = np.array([0.0, 0.0, depth])
         arm.append(s.moment + np.cross(below, s.unit_vector))
-    return np.stack(arm)[bench.rows.setup]
+    simulated = np.stack(arm)[bench.rows.setup]
+    return simulated if bench.stands is None else simulated + bench.stands.moment
+
+
+def moments_of_load(bench: Bench, depth: float, load: Array) -> Array:
+    """(n, 3) Nm about these axes under a load (n,) N along the direction, and what pulls across."""
+    along, there = moments(bench, depth) * load[:, None], bench.stands
+    if there is None:
+        return along
+    return np.asarray(along + there.twist + np.cross([0.0, 0.0, depth], there.force))
+
+
+def _carried(bench: Bench, depth: float) -> Array:
+    """(n, 3) Nm of the load, as it acts."""
+    ahead = 0.0 if bench.stands is None else bench.stands.ahead
+    return moments_of_load(bench, depth, bench.load + ahead)
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -51,8 +66,8 @@ def variants(bench: Bench) -> list[Variant]:
     depth)."""
     out = []
     for depth in DEPTHS_M:
-        m = moments(bench, depth)
-        columns = [bench.add(bench.outside_column(m[:, a] ** 2 * bench.load)) for a in range(3)]
+        m, carried = moments(bench, depth), _carried(bench, depth)
+        columns = [bench.add(bench.outside_column(m[:, a] * carried[:, a])) for a in range(3)]
         both = 2 * m[:, 0] * m[:, 1]  # of loads that turn it about both
         info: dict[str, Any] = {"depth_m": depth, "turned": False}
         seen = [a for a in range(3) if np.abs(m[:, a]).max() > 1e-3]
@@ -70,11 +85,12 @@ def variants(bench: Bench) -> list[Variant]:
             )
         )
         if {0, 1} <= set(seen) and np.abs(both).max() > 1e-3:
-            coupling = bench.add(bench.outside_column(both * bench.load))
+            crossed = m[:, 0] * carried[:, 1] + m[:, 1] * carried[:, 0]
+            coupling = bench.add(bench.outside_column(crossed))
             stand = _turned(depth, [*(columns[a] for a in seen), coupling], seen)
             out.append(stand)
         if bench.has_q and any(a < 2 for a in seen):  # else any joint's curve
-            out.append(_on_feet(bench, out[-1], m))
+            out.append(_on_feet(bench, out[-1], m, carried))
         for a in seen:
             if a < 2 or depth == 0:
                 out.append(
@@ -115,16 +131,14 @@ def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
     )
 
 
-def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
+def _on_feet(bench: Bench, stand: Variant, m: Array, carried: Array) -> Variant:
     """The same with compliances that change with the moment about a lying axis, by which feet are
-    pressed, or bolts let go of a plate; m (n, 3) m."""
+    pressed, or bolts let go of a plate; m (n, 3) m, carried (n, 3) Nm."""
     axes, k = [a for a in stand.info["axes"] if a < 2], len(stand.columns)
     bends = [
-        (a, share * (float(np.abs(m[:, a] * bench.load).max()) or 1.0))
-        for a in axes
-        for share in BENDS_AT
+        (a, share * (float(np.abs(carried[:, a]).max()) or 1.0)) for a in axes for share in BENDS_AT
     ]
-    bent = [bench.add(bent_column(bench, m[:, a], at)) for a, at in bends]
+    bent = [bench.add(bent_column(bench, m[:, a], carried[:, a], at)) for a, at in bends]
     root = np.zeros((k + len(bent), k + len(bent)))
     root[:k, :k] = stand.root
     root[k:, k:] = BENDS * np.eye(len(bent))
@@ -151,10 +165,10 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     )
 
 
-def bent_column(bench: Bench, m: Array, beyond: float) -> Array:
-    """Stacked column of a rotation by what a moment exceeds `beyond` Nm, either way, about an axis
-    of lever m (n,) m."""
-    return bench.outside_column(m * hinge(m * bench.load, beyond))
+def bent_column(bench: Bench, m: Array, moment: Array, beyond: float) -> Array:
+    """Stacked column of a rotation by what a moment (n,) Nm exceeds `beyond` Nm, either way, about
+    an axis of lever m (n,) m."""
+    return bench.outside_column(m * hinge(moment, beyond))
 
 
 def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
@@ -174,18 +188,22 @@ def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
 
 
 def _columns(bench: Bench, law: Law) -> list[Array]:
-    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`; of what is added
-    beyond a moment times what goes beyond it."""
-    m, out = moments(bench, law.constants["depth"]), []
-    lever = dict(zip("xyz", m.T, strict=True))
+    """`(r x n)_a` times the moment of the load about a, of a coupling x times y and y times x; of
+    what is added beyond a moment times what goes beyond it."""
+    depth, out = law.constants["depth"], []
+    lever = dict(zip("xyz", moments(bench, depth).T, strict=True))
+    moment = dict(zip("xyz", _carried(bench, depth).T, strict=True))
     for t in law.terms:
         axis = str(t.shape.get("axis", "xy"))
         if "beyond" in t.shape:
-            out.append(bent_column(bench, lever[axis], t.shape["beyond"]))
+            out.append(bent_column(bench, lever[axis], moment[axis], t.shape["beyond"]))
             continue
-        square = lever[axis] ** 2 if axis in lever else 2 * lever["x"] * lever["y"]
-        out.append(bench.outside_column(square * bench.load))
+        turns = ((axis, axis),) if axis in lever else (("x", "y"), ("y", "x"))
+        out.append(bench.outside_column(sum((lever[a] * moment[b] for a, b in turns), _NONE)))
     return out
+
+
+_NONE = np.zeros(1)
 
 
 EFFECT = Effect(

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.effects.base_compliance import moments
+from identification.gap.effects.base_compliance import moments, moments_of_load
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flows import Flow
@@ -74,6 +74,11 @@ def lever_of(bench: Bench, axis: str, depth: float) -> Array:
     return np.asarray(moments(bench, depth) @ np.array(AXES[axis]))
 
 
+def moment_of(bench: Bench, axis: str, depth: float) -> Array:
+    """(n,) Nm of the load about an axis so far below the base."""
+    return np.asarray(moments_of_load(bench, depth, bench.true_load) @ np.array(AXES[axis]))
+
+
 def variants(bench: Bench) -> list[Variant]:
     """Per axis and depth of the axis."""
     out = []
@@ -108,7 +113,7 @@ def _about(
     def column(state: Array) -> int:
         return bench.add(bench.outside_column(natural * lever * state))
 
-    load = lever * bench.true_load * (longest >= _SHORTEST)
+    load = moment_of(bench, axis, depth) * (longest >= _SHORTEST)
     info = {"axis": axis, "depth_m": depth, "natural": natural, GIVES_LEAST: _LEAST}
     return load, column, info
 
@@ -145,13 +150,14 @@ def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
 def _columns(bench: Bench, law: Law) -> list[Array]:
     """Column of every term, in their order: state of radius `threshold` on the moment, lagging."""
     lever = lever_of(bench, law.constants["axis"], law.constants["depth"])
-    states = states_of(bench, law, lever * bench.true_load)
+    moment = moment_of(bench, law.constants["axis"], law.constants["depth"])
+    states = states_of(bench, law, moment)
     return [bench.outside_column(lever * states[i]) for i in range(len(law.terms))]
 
 
 def _flow(bench: Bench, law: Law) -> Flow:
-    lever = lever_of(bench, law.constants["axis"], law.constants["depth"])
-    return flow_of(bench, law, lever * bench.true_load)
+    moment = moment_of(bench, law.constants["axis"], law.constants["depth"])
+    return flow_of(bench, law, moment)
 
 
 EFFECT = Effect(

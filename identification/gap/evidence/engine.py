@@ -113,12 +113,14 @@ class Engine:
 
     @contextmanager
     def on(self, bench: Bench) -> Iterator[None]:
-        """Within it, effects are looked for on another bench of the same rows and pool."""
-        kept, self.bench = self.bench, bench
+        """Within it, effects are looked for on another bench of the same rows and pool; what is
+        kept of variants is of one bench."""
+        kept = self.bench, self.cache, self.stacks, self.arranged
+        self.bench, self.cache, self.stacks, self.arranged = bench, {}, {}, {}
         try:
             yield
         finally:
-            self.bench = kept
+            self.bench, self.cache, self.stacks, self.arranged = kept
 
     @property
     def levels(self) -> list[NoiseLevel]:

@@ -18,7 +18,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, joined, up_to_likeliest
 from identification.gap.model.bench import Bench
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import Variant, able_beside
 from identification.gap.words import IN_JOINTS
 
 MOST = 3  # joints of an arm's word
@@ -33,7 +33,8 @@ def family_of(variants: Sequence[Variant], word: str, beside: tuple[Part, ...]) 
     what creeps more than in proportion in one joint does so in all."""
     same = [p.variant for p in beside if p.word == word]
     taken, bent = {v.joint for v in same} - {None}, {v.exceeds_proportion for v in same}
-    mine = (v for v in variants if v.word == word and v.joint not in taken)
+    able = able_beside(variants, {p.word for p in beside})
+    mine = (v for v in able if v.word == word and v.joint not in taken)
     return [v for v in mine if not bent or v.exceeds_proportion in bent]
 
 

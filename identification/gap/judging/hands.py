@@ -51,8 +51,8 @@ def _same_elsewhere(engine: Engine, explanation: Explanation) -> bool:
     """Whether the holds that no load went beyond show the largest effect for sure, and do as much
     to themselves by it as all holds together have it."""
     rows = engine.bench.rows
-    keep = np.ones(engine.bench.layout.size, dtype=bool)
-    keep[: rows.n] = ~rows.gone_beyond
+    kept = ~rows.gone_beyond
+    keep = engine.bench.layout.read_in(kept, kept[rows.edges])
     alone, whole = fit(engine, explanation, keep), fit(engine, explanation)
     w, covariance = alone.of(0)
     if w @ np.linalg.lstsq(covariance, w, rcond=None)[0] < _SURE:

@@ -109,18 +109,21 @@ def columns_of(bench: Bench, law: Law) -> list[Array]:
     return out
 
 
-def torques_across(bench: Bench, law: Law, values: Array) -> Array:
-    """(n, m) Nm on the joints of an arm by a load across with the law's terms (k,)."""
-    out, setup = np.zeros((bench.rows.n, bench.data.joints)), bench.rows.setup
-    levers = np.stack([s.tangent_lever for s in bench.data.setups])  # (setups, 2, m)
+def loads_across(bench: Bench, law: Law, values: Array) -> Array:
+    """(n, 2) N along the tangents of every setup, of a load across with the law's terms (k,)."""
+    out = np.zeros((bench.rows.n, 2))
     for t, value in zip(law.terms, values, strict=True):
         if t.coefficient == "as_read" and bench.rows.tangential is not None:
-            out += value * np.einsum("nk,nkj->nj", bench.rows.tangential, levers[setup])
+            out += value * bench.rows.tangential
         elif t.coefficient == "tangent":
-            shares = _shares(bench, t.shape["across"])
-            lever = np.einsum("sk,skj->sj", shares, levers)[setup]
-            out += value * _load(bench, t)[:, None] * lever
+            shares = _shares(bench, t.shape["across"])[bench.rows.setup]
+            out += value * _load(bench, t)[:, None] * shares
     return out
+
+
+def tangent_levers(bench: Bench) -> Array:
+    """(setups, 2, m) m: torque of every joint per newton along either tangent."""
+    return np.stack([s.tangent_lever for s in bench.data.setups])
 
 
 def _acts(bench: Bench, t: Term) -> Flags:

@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.across_law import torques_across
+from identification.gap.laws.across_law import loads_across, tangent_levers
 from identification.gap.laws.lags import ahead_of_reading, kinds_of
 from identification.gap.laws.law import Law, in_pose
 from identification.gap.laws.leverage import changes, changes_turned
-from identification.gap.model.bench import Bench
+from identification.gap.model.bench import Bench, Standing
 
 _STANDS = frozenset({"offset", "angle", "turn"})
 _PULLS = frozenset({"tangent", "as_read"})
@@ -45,28 +45,50 @@ def as_it_stands(bench: Bench, acts: Iterable[Acts]) -> Bench:
     acting = [a for a in acts if changes_torques(a.law)]
     if not acting or not bench.data.arm or bench.imposed:
         return bench
-    lever, aside, ahead = bench.lever, np.zeros(bench.lever.shape), np.zeros(bench.rows.n)
+    n = bench.rows.n
+    lever, moment = bench.lever, np.zeros((n, 3))
+    torque, ahead = np.zeros(lever.shape), np.zeros(n)
+    force = np.zeros((n, 3))
     for law, values in acting:
-        lever = lever + _levers(bench, law, values)
-        aside = aside + torques_across(bench, law, values)
-        if law.constants.get("channel") == "force":
-            lag = law.constants["lag"]
-            for kind, value in zip(kinds_of(law), values, strict=True):
-                ahead = ahead + value * ahead_of_reading(bench, kind, lag)
-    return bench.standing(lever, aside, ahead)
+        longer, more = _levers(bench, law, values)
+        lever, moment = lever + longer, moment + more
+        across = loads_across(bench, law, values)
+        setups, setup = bench.data.setups, bench.rows.setup
+        torque = torque + np.einsum("nk,nkj->nj", across, tangent_levers(bench)[setup])
+        force = force + np.einsum(
+            "nk,nkc->nc", across, np.stack([s.tangents for s in setups])[setup]
+        )
+        ahead = ahead + _ahead(bench, law, values)
+    points = np.stack([s.point + np.zeros(3) for s in bench.data.setups])[bench.rows.setup]
+    twist = np.cross(points, force)
+    return bench.standing(Standing(lever, torque, ahead, moment, force, twist))
 
 
-def _levers(bench: Bench, law: Law, values: Array) -> Array:
-    """(n, m) m by which the levers are others, of an arm that stands so."""
+def _ahead(bench: Bench, law: Law, values: Array) -> Array:
+    """(n,) N by which the load is ahead of a force that lags so."""
+    out = np.zeros(bench.rows.n)
+    if law.constants.get("channel") == "force":
+        for kind, value in zip(kinds_of(law), values, strict=True):
+            out += value * ahead_of_reading(bench, kind, law.constants["lag"])
+    return out
+
+
+def _levers(bench: Bench, law: Law, values: Array) -> tuple[Array, Array]:
+    """(n, m) m by which the levers of an arm that stands so are others, and (n, 3) m by which the
+    moment of a newton about the base's origin is, that one to first order."""
     offset, turn, angles = np.zeros(3), np.zeros(3), np.zeros(bench.data.joints)
     for t, value in zip(law.terms, values, strict=True):
         if t.coefficient == "angle":
             angles[t.shape["joint"]] = value
         elif t.coefficient in _STANDS:
             (offset if t.coefficient == "offset" else turn)["xyz".index(t.shape["axis"])] = value
-    each = []
+    levers, moments = [], []
     for s in bench.data.setups:
         shifts, swings = changes(s, offset, angles)
-        each.append(shifts @ offset + swings @ angles + changes_turned(s, turn) @ turn)
-    there = in_pose(bench, law.constants.get("only_in"))
-    return np.asarray(np.stack(each)[bench.rows.setup] * there[:, None])
+        levers.append(shifts @ offset + swings @ angles + changes_turned(s, turn) @ turn)
+        moved = np.dot(s.shifted_point, offset) + np.dot(s.turned_point, angles)
+        swung = np.cross(s.point + np.zeros(3), -np.cross(turn, s.unit_vector))
+        moments.append(np.cross(moved + np.zeros(3), s.unit_vector) + swung)
+    there = in_pose(bench, law.constants.get("only_in"))[:, None]
+    setup = bench.rows.setup
+    return np.stack(levers)[setup] * there, np.stack(moments)[setup] * there

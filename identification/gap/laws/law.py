@@ -76,8 +76,8 @@ class Laws:
                 f"{variant.word}, {variant.label}: the library does not say {missing} of this shape"
             ) from missing
         if self.through_springs:
-            about = tuple(float(c) for c in variant.info.get("compliance", bench.compliance))
-            law = replace(law, constants={**law.constants, "about": about})
+            springs = bench.compliance if variant.about is None else variant.about
+            law = replace(law, constants={**law.constants, "about": tuple(springs.tolist())})
         if stands is not None:
             law = replace(law, constants={**law.constants, AS_IT_STANDS: True})
         return law, scale

@@ -46,6 +46,21 @@ class KnownEffects:
     across: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """How an arm stands and is loaded otherwise than simulated and read. lever (n, m) m: that it
+    has; torque (n, m) Nm: beside that of the load along the direction; ahead (n,) N: load beyond
+    what was read; moment (n, 3) m: change of the moment about the base's origin of a newton along
+    the direction; force (n, 3) N: that pulls across, and twist (n, 3) Nm: its moment there."""
+
+    lever: Array
+    torque: Array
+    ahead: Array
+    moment: Array
+    force: Array
+    twist: Array
+
+
 _FURTHER, _FIRST, _ONE_WAY = 6, 1.4, 0.9  # radii; the first, of the last inner one; of the range
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
@@ -65,8 +80,8 @@ class Bench:
     scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
     time and response about it.
     columns: the pool, filled by the effects. moves (n,) m: what instruments of the response read,
-    where more is known of it than a straight line. aside (n, m) Nm: torques beside those of the
-    load along the direction, and ahead (n,) N: load beyond what was read, where these are known.
+    where more is known of it than a straight line. stands: how the arm stands and is loaded,
+    where that is known to be otherwise.
     """
 
     data: GapData
@@ -90,8 +105,7 @@ class Bench:
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
     moves: Array | None = None
     known: KnownEffects | None = None
-    aside: Array | None = None
-    ahead: Array | None = None
+    stands: Standing | None = None
     # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
     lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 
@@ -162,13 +176,13 @@ class Bench:
     def true_load(self) -> Array:
         """(n,) N: the load without the drift and the lag of its reading."""
         read = self.load - self.zero_line
-        return np.asarray(read if self.ahead is None else read + self.ahead)
+        return np.asarray(read if self.stands is None else read + self.stands.ahead)
 
     @cached_property
     def true_torque(self) -> Array:
         """(n, m) Nm on the joints without it: what thresholds, plays and friction answer to."""
         along = self.lever * self.true_load[:, None]
-        return np.asarray(along if self.aside is None else along + self.aside)
+        return np.asarray(along if self.stands is None else along + self.stands.torque)
 
     def reach_of(self, load: Array) -> float:
         """Range of a load with zero in it. Where the displacement is imposed: of what the rig
@@ -297,18 +311,17 @@ class Bench:
             object.__setattr__(out, name, value)
         return out
 
-    def standing(self, lever: Array, aside: Array, ahead: Array) -> Bench:
-        """The bench of an arm with these levers (n, m) m, torques aside (n, m) Nm, and load (n,) N
-        ahead of its reading; what is known of it else stays, and its pool."""
+    def standing(self, there: Standing) -> Bench:
+        """The bench of an arm that stands and is loaded so; what is known of it else stays, and its
+        pool."""
+        _ = self.stated_slope, self.course  # are told by the levers that are simulated
         out = copy(self)
-        for known in ("true_load", "true_torque", "likelier_joints"):
-            out.__dict__.pop(known, None)
-        torque = lever * self.load[:, None] + aside
-        values = {"lever": lever, "aside": aside, "ahead": ahead, "torque": torque}
-        for name, value in {**values, "elastic": torque * self.compliance}.items():
+        for name in ("true_load", "true_torque", "likelier_joints"):
+            out.__dict__.pop(name, None)
+        torque = there.lever * self.load[:, None] + there.torque
+        values = {"lever": there.lever, "torque": torque, "elastic": torque * self.compliance}
+        for name, value in {**values, "stands": there, "flows": {}, "lags": {}}.items():
             object.__setattr__(out, name, value)
-        for name in ("flows", "lags"):
-            object.__setattr__(out, name, {})
         return out
 
     def plays(

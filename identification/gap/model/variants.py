@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
@@ -18,7 +18,8 @@ LASTING = " lasting"  # one that outlasts the arm's way to another pose
 TAKEN_BACK = " taken back"  # one that is lost between runs
 SET_UP_ANEW = " set up anew"  # one that is lost when the rig is turned to another direction
 
-STANDS = "stands"  # in `info`: where it acts, if not on the simulated arm
+# In `info`: where it acts, if not on the simulated arm; and which word makes the arm stand so.
+STANDS, ANSWERS_TO = "stands", "answers_to"
 CALLED = "called"  # in `info`: what a place and a memory are called, with which labels begin
 WARMS_UP = "T "  # a path in time of one rate is called so, and by its share of the session
 
@@ -67,6 +68,11 @@ class Variant:
     def stands(self) -> Callable[[Any], Any] | None:
         """From the simulated arm's bench to that on which it acts, if that is another one."""
         return self.info.get(STANDS)
+
+    @property
+    def answers_to(self) -> str | None:
+        """The word beside which alone it acts there, if it is made for that."""
+        return self.info.get(ANSWERS_TO)
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -206,6 +212,12 @@ class Variant:
             self.slips_on,
             self.cost,
         )
+
+
+def able_beside(variants: Sequence[Variant], words: Collection[str]) -> list[Variant]:
+    """Those that may stand beside these words: what acts where one of them has the arm does so
+    beside that one alone."""
+    return [v for v in variants if v.answers_to is None or v.answers_to in words]
 
 
 def variant(

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 from functools import partial
 
-import numpy as np
-
-from identification.gap.effects import EFFECTS, base_slip
+from identification.gap.effects import EFFECTS, base_compliance, base_slip
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
@@ -16,7 +14,7 @@ from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import fit
 from identification.gap.laws.as_it_stands import Acts, as_it_stands, changes_torques
 from identification.gap.laws.closer import Word, evidence
-from identification.gap.model.variants import STANDS, Variant, place_of
+from identification.gap.model.variants import ANSWERS_TO, STANDS, Variant, place_of
 from identification.gap.words import IN_JOINTS
 
 _HOPELESS = 60.0  # nats below what there is: its finer shapes won't do better either
@@ -38,16 +36,13 @@ def acting_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
         return []
     values = scale * fit(engine, explanation).of(parts.index(other))[0]
     stands = partial(as_it_stands, acts=[Acts(law, values)])
-    there = stands(bench)
-    if mine[0].word not in IN_JOINTS and not np.any(there.true_load != bench.true_load):
-        return []
-    with engine.on(there):
+    with engine.on(stands(bench)):
         found = _shapes(engine, mine[0], other)
-    return [v.known_by(_WHERE, **{STANDS: stands}) for v in found]
+    return [v.known_by(_WHERE, **{STANDS: stands, ANSWERS_TO: other.word}) for v in found]
 
 
 _TWO = 2
-_ANSWERS = IN_JOINTS | {base_slip.WORD}  # of a base that slips, to the load; its levers are long
+_ANSWERS = IN_JOINTS | {base_slip.WORD, base_compliance.WORD}
 _WHERE = ", on the arm as it stands"
 
 

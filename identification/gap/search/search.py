@@ -24,7 +24,7 @@ from identification.gap.explanations.priors import LOG_NONE, log_unknown
 from identification.gap.explanations.several import in_more_joints, in_one_joint_each, polished
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.model.noise import UNSURE
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import Variant, able_beside
 from identification.gap.search.acting import acting_anew
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
@@ -147,7 +147,8 @@ def force(
     parts, evidence, energy = start.parts, 0.0, 0.0
     while left:
         levels, energy = up_to_likeliest(engine, parts)
-        scored = score(engine, levels, [v for v in variants if v.word in left], energy)
+        able = able_beside(variants, {p.word for p in parts})
+        scored = score(engine, levels, [v for v in able if v.word in left], energy)
         top = max(scored, key=lambda s: s.log_evidence)
         parts = (*parts, Part(top.variant, top.scale))
         left.discard(top.variant.word)
@@ -277,7 +278,7 @@ def _with_one_more(
     start: Explanation,
     known: dict[frozenset[str], Explanation],
 ) -> dict[frozenset[str], Explanation]:
-    others = [v for v in variants if v.word not in start.words]
+    others = [v for v in able_beside(variants, start.words) if v.word not in start.words]
     levels, energy = up_to_likeliest(engine, start.parts)
     out: dict[frozenset[str], Explanation] = {}
     found_words = by_word(score(engine, levels, others, energy))
@@ -312,9 +313,12 @@ def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explan
     found = _with(engine, variants, start, _read_and_placed(engine, start))
     for _ in range(_TURNS):  # where the arm stands was found beside a law of the simulated torques
         plain = in_one_joint_each(found)
-        acting = _with(engine, variants, plain, acting_anew(engine, plain))
+        fresh = acting_anew(engine, plain)
+        acting = polished(engine, [*variants, *fresh], plain) if fresh else plain
         if acting.log_weight <= found.log_weight + _TURN_GAINS:
             break
+        last = {(v.word, v.answers_to) for v in fresh}  # on the arm as it was found before
+        variants[:] = [v for v in variants if (v.word, v.answers_to) not in last] + fresh
         found = _with(engine, variants, acting, _read_and_placed(engine, acting))
     return found
 

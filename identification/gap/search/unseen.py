@@ -354,6 +354,7 @@ class _Columns:
         """everywhere (n,): a path that goes beyond every hold."""
         self._bench, self._laws = bench, EFFECTS[part.word].laws
         self._law, self._scale = self._laws.of(bench, part.variant)
+        self._stands = part.variant.stands
         self._straight = self._made(bench)
         self.remembers = not np.allclose(self._made(bench.along(everywhere)), self._straight)
 
@@ -365,7 +366,8 @@ class _Columns:
         return self._made(self._bench.along(overshoot))
 
     def _made(self, bench: Bench) -> Array:
-        return self._laws.rows(bench, self._law) * self._scale
+        there = bench if self._stands is None else self._stands(bench)
+        return self._laws.rows(there, self._law) * self._scale
 
 
 class _White:

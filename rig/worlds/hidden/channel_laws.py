@@ -253,11 +253,13 @@ def elsewhere(law: str) -> Callable[[Scene, Generator], Drawn]:
             turn[draw_joint(scene, random)] = np.radians(2.0) * random.choice([-1.0, 1.0])
 
         def change(size: float) -> Change:
-            levers = []
+            levers, tools = [], []
             for setup in scene.plan.setups:
                 arm = place(scene.plan.poses[setup.pose] + size * turn)
-                levers.append(arm.levers(arm.tool(scene.plan.tcp_mm * 1e-3 + size * offset)))
-            return Change(levers=np.array(levers), stands=np.tile(size * turn, (len(levers), 1)))
+                tools.append(arm.tool(scene.plan.tcp_mm * 1e-3 + size * offset))
+                levers.append(arm.levers(tools[-1]))
+            stands = np.tile(size * turn, (len(levers), 1))
+            return Change(levers=np.array(levers), tools=np.array(tools), stands=stands)
 
         def parameters(size: float) -> dict[str, Any]:
             return {"offset_mm": size * offset * 1e3, "stands_off_rad": size * turn}

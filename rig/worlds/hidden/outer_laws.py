@@ -85,7 +85,13 @@ def beams(which: str) -> Callable[[Scene, Generator], Drawn]:
 
 def moments(scene: Scene, depth: float) -> Array:
     """(s, 3) m: moment per newton along the direction about axes `depth` m below the base."""
-    return np.cross(scene.tool + np.array([0.0, 0.0, depth]), scene.unit)
+    return np.cross(scene.point + np.array([0.0, 0.0, depth]), scene.unit)
+
+
+def moments_of_load(scene: Scene, depth: float) -> Array:
+    """(n, 3) Nm about these axes under the load as it acts."""
+    above = scene.point[scene.history.setup] + np.array([0.0, 0.0, depth])
+    return np.cross(above, scene.force)
 
 
 def turning_base(which: str) -> Callable[[Scene, Generator], Drawn]:
@@ -93,7 +99,9 @@ def turning_base(which: str) -> Callable[[Scene, Generator], Drawn]:
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         depth = random.uniform(0.0, 0.8)
-        moment = moments(scene, 0.0 if which == "yaw" else depth)
+        below = 0.0 if which == "yaw" else depth
+        lever = moments(scene, below)[scene.history.setup]
+        moment = moments_of_load(scene, below)
         soft = random.uniform(0.5, 1.0, 3)
         if which == "tilt":
             soft[2] = 0.0
@@ -102,12 +110,13 @@ def turning_base(which: str) -> Callable[[Scene, Generator], Drawn]:
         if which == "oblique":  # one soft edge of the stand
             angle = random.uniform(0, np.pi)
             edge = np.array([np.cos(angle), np.sin(angle), 0.0])
-            compliance = (moment @ edge) ** 2
+            turned = (lever @ edge) * (moment @ edge)
         else:
-            compliance = moment**2 @ soft
+            turned = (lever * moment) @ soft
         if which == "feet":  # and sinks on its feet
-            compliance = compliance + random.uniform(0.05, 0.2) * scene.unit[:, 2] ** 2 + 0.01
-        path = 1e-6 * compliance[scene.history.setup] * scene.history.load
+            sinks = random.uniform(0.05, 0.2) * scene.unit[:, 2] ** 2 + 0.01
+            turned = turned + sinks[scene.history.setup] * scene.history.load
+        path = 1e-6 * turned
 
         def parameters(size: float) -> dict[str, Any]:
             turn = {a: 1e6 / (size * s) for a, s in zip("xyz", soft, strict=True) if s}
@@ -128,7 +137,7 @@ def slipping_base(axis: str, law: str) -> Callable[[Scene, Generator], Drawn]:
             angle = random.choice([0.0, np.pi / 2]) if law == "sharp" else random.uniform(0, np.pi)
             turn = np.array([np.cos(angle), np.sin(angle), 0.0])
         lever = moments(scene, depth) @ turn
-        moment = lever[scene.history.setup] * scene.history.load
+        moment = moments_of_load(scene, depth) @ turn
         top = float(np.abs(moment).max())
         if top < 10.0:
             raise Unsuited

@@ -67,11 +67,23 @@ class Scene:
     @cached_property
     def torque(self) -> Array:
         """(n, 6) Nm on the joints under the load as it acts, the weights as planned."""
-        setup, load = self.history.setup, self.history.load
         changed = self.turned or Change()
         levers = self.levers if changed.levers is None else changed.levers
-        pulls = self.unit[setup] if changed.across is None else self.unit[setup] + changed.across
-        return np.asarray(np.einsum("nij,nj->ni", levers[setup], pulls) * load[:, None])
+        return np.asarray(np.einsum("nij,nj->ni", levers[self.history.setup], self.force))
+
+    @cached_property
+    def force(self) -> Array:
+        """(n, 3) N: the load as it acts."""
+        pulls = self.unit[self.history.setup]
+        if self.turned is not None and self.turned.across is not None:
+            pulls = pulls + self.turned.across
+        return np.asarray(pulls * self.history.load[:, None])
+
+    @property
+    def point(self) -> Array:
+        """(s, 3) m: where it acts, over the base."""
+        moved = None if self.turned is None else self.turned.tools
+        return self.tool if moved is None else moved
 
     @cached_property
     def net(self) -> Array:
@@ -90,22 +102,25 @@ class Scene:
 
     @cached_property
     def elastic(self) -> Array:
-        """(n) m of deflection along the direction with six springs only."""
+        """(n) m of deflection along the direction with six springs only, as planned."""
         along = np.einsum("sij,sj->si", self.levers, self.unit)[self.history.setup]
-        return np.asarray(np.sum(along * self.torque / self.plan.springs, axis=1))
+        softness = np.sum(along**2 / self.plan.springs, axis=1)
+        return np.asarray(softness * self.history.load)
 
 
 @dataclass(frozen=True)
 class Change:
     """What one effect changes; all that is left out stays as it was.
 
-    springs (6) factors; levers (s, 6, 3) instead of the nominal ones; stands (s, 6) rad off the
-    commanded angles; across (n, 3) load beside the nominal one, as its share; joints (n, 6) rad;
-    outside (n) m along the direction; laser and force map channels (n) m, (n, 3) N to channels.
+    springs (6) factors; levers (s, 6, 3) and tools (s, 3) m instead of the nominal ones; stands
+    (s, 6) rad off the commanded angles; across (n, 3) load beside the nominal one, as its share;
+    joints (n, 6) rad; outside (n) m along the direction; laser and force map channels (n) m,
+    (n, 3) N to channels.
     """
 
     springs: Array | None = None
     levers: Array | None = None
+    tools: Array | None = None
     stands: Array | None = None
     across: Array | None = None
     joints: Array | None = None
