@@ -200,10 +200,10 @@ def _deepen(
         if words not in pool or pool[words].log_weight < explanation.log_weight:
             pool[words] = explanation
     ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
-    first = [_anew(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
+    first = [_anew(engine, variants, polished(engine, variants, e), pool) for e in ranked[:kept]]
     closely |= {e.words for e in first}
     lent = (_with_lent_shapes(engine, variants, e, first) for e in ranked[kept:_READING])
-    others = [_anew(engine, variants, e) for e in lent]
+    others = [_anew(engine, variants, e, pool) for e in lent]
     for explanation in [*first, *others]:
         if pool[explanation.words].log_weight < explanation.log_weight:
             pool[explanation.words] = explanation
@@ -306,11 +306,20 @@ def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
     return apart if len(apart) < len(scored) else []
 
 
-def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+def _anew(
+    engine: Engine,
+    variants: list[Variant],
+    start: Explanation,
+    pool: dict[frozenset[str], Explanation],
+) -> Explanation:
     """With instruments that read what its other effects do, a pose, and what goes through the
     springs, that are looked at beside them, and mechanisms that answer to these, if that is better;
-    the variants then hold these as well."""
+    the variants then hold these as well. Not so where hardly more than noise is left to gain, and
+    others of the pool are far ahead."""
     found = _with(engine, variants, start, _read_and_placed(engine, start))
+    behind = found.log_weight < _best(pool) - _MAY_GAIN
+    if behind and found.eta <= engine.bench.noise.stated:
+        return found
     for _ in range(_TURNS):  # where the arm stands was found beside a law of the simulated torques
         plain = in_one_joint_each(found)
         fresh = acting_anew(engine, plain)
