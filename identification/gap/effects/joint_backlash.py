@@ -368,7 +368,11 @@ def _look_closer(word: Word) -> list[Variant]:
     """Beside the leading word; and alone, where it explains nearly as much: that may be a curve
     which does what the play does. Ends of which one is softer where a play is there to see."""
     shown = seen(word)
-    looks = [(word, places(word.alone, word.beside), shown)]
+    found = places(word.alone, word.beside)
+    looks = [(word, found, shown)]
+    if not word.engine.bench.has_q:  # each by itself: the best of all may be another joint's
+        others = places(word.alone, word.beside, _is_hung, 1)
+        looks += [(word, [s], shown) for s in others if s.variant not in {f.variant for f in found}]
     if word.beside and nearly_leads(word):
         looks.append((replace(word, ranked=[WORD]), word.alone[:1], True))
     out: list[Variant] = []
@@ -378,6 +382,12 @@ def _look_closer(word: Word) -> list[Variant]:
         if closely:
             out += closing_in(of, uneven, starts, CLOSE)
     return out
+
+
+def _is_hung(v: Variant) -> bool:
+    """Whether weights alone say where it is crossed: of a tool's mass that nobody states, on a grid
+    that is coarser than the zone. What is preloaded at will may look better there."""
+    return v.info["crossing"] == "weight" and not v.info["preload_Nm"]
 
 
 EFFECT = Effect(
