@@ -183,13 +183,17 @@ def _by_one_word(
     say which, where that word then explains more than the best explanation does without."""
     if _hopeless(found, foretells(found), paid_off=True):
         return found, 0.0
-    best, loads = found.explanations[0].log_weight, None
+    best, loads, clean = found.explanations[0].log_weight, None, frozenset[str]()
     for more in by_one_word(found):
+        if more.words == clean:  # further lags, which come last
+            break
         others = {w for w in WORDS if w not in more.words}
         asking = _along(found, more, known, {*withheld, *others})
         ahead = asking.explanations[0].log_weight - more.cost
         if ahead > best and not acts_by_hands_alone(asking):
             best, loads = ahead, more
+            left = asking.explanations[0].eta > found.engine.bench.noise.stated
+            clean = frozenset() if left else more.words
     if loads is None:
         return found, 0.0
     again = _along(found, loads, known, withheld)

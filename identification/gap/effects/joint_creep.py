@@ -17,6 +17,7 @@ Source: Findley 1976.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, factors
 from identification.gap.laws.law import ANEW, Law, Laws, Term
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import retarded
+from identification.gap.model.history import retarded, unread_way
 from identification.gap.model.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -249,6 +250,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     )
     joint = v.info.get("joint")
     line = BENT_SLOPE if v.info.get("bent") else 1.0
+    found = _whenever_it_came(bench, found, times)
     return {
         "creep_fraction": found.per_spring(np.full(len(times), line), joint),
         "creep_fraction_of_run": found.per_spring(
@@ -257,6 +259,18 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
         "run": Parameter(seconds, seconds, seconds, "s"),
         "retardation_time": factors(mean, 3.0, "s"),
     }
+
+
+def _whenever_it_came(bench: Bench, found: Coefficients, times: Array) -> Coefficients:
+    """Coefficients as uncertain as the moment at which a load came to its level, which no reading
+    shows: anywhere on its way there (a rectangular distribution, GUM 4.3.7). What had crept before
+    the first reading, `dt / T` of it, is taken for the spring's."""
+    early = np.minimum(unread_way(bench.rows) / 12**0.5 / times, _MOST)
+    moves = found.w * early * (1 + float(np.sum(found.w)))
+    return replace(found, cov=found.cov + np.outer(moves, moves))
+
+
+_MOST = 0.5  # of what creeps: of more the first readings show little
 
 
 def run_seconds(bench: Bench) -> float:

@@ -41,8 +41,7 @@ from identification.gap.laws.springs_found import about_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import (
     sampling_time,
-    settling_share,
-    standing_on,
+    unread_way,
 )
 from identification.gap.model.variants import Variant, variant
 
@@ -204,14 +203,8 @@ def _turning_sd(bench: Bench, lag: float) -> float:
     """s by which a lag is uncertain because nobody recorded when the load began to move: between
     two samples, so that it took half a sample more or less. What a lag shows at the first sample of
     a hold is the share of that way which it is late."""
-    rows = bench.rows
-    begins = rows.hold_starts & ~rows.starts
-    if rows.continuous or not begins.any():
-        return 0.0
-    half = rows.half_sample
-    gaps = np.diff(rows.session, prepend=rows.session[0])
-    way = float(np.median((gaps - settling_share(rows) - standing_on(rows))[begins]))
-    return 0.5 * half / max(way, half) * max(lag - half, 0.0)
+    half, way = bench.rows.half_sample, unread_way(bench.rows)
+    return 0.5 * half / max(way, half) * max(lag - half, 0.0) if way else 0.0
 
 
 _LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags that are compared

@@ -147,6 +147,12 @@ class Variant:
         return float(self.info.get("lag_s", 0.0))
 
     @property
+    def lags_freely(self) -> bool:
+        """Whether it is a lag of the displacement between two kinds, as it is read by itself."""
+        found = self.info.get("kind") == "window" and self.late_channel == "displacement"
+        return found and not self.info.get("of_all")
+
+    @property
     def late_channel(self) -> str | None:
         """The channel that lags, force or displacement."""
         return self.info.get("channel")

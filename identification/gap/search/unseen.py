@@ -23,11 +23,13 @@ import numpy as np
 
 from identification.arrays import Array, Flags, Ints
 from identification.gap.effects import EFFECTS
+from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import IMPERFECTION
 from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.explanation import Explanation, SearchResult, explain
 from identification.gap.model.bench import Bench
+from identification.gap.model.history import sampling_time
 from identification.gap.model.variants import block
 from identification.gap.recording.rows import Rows
 
@@ -93,13 +95,14 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
 def by_one_word(found: SearchResult) -> Iterator[Unseen]:
     """What words alone say of the loads between readings, the likeliest first, where each leaves
     less along them, and no more than the best explanation does: several laws together, none of
-    which is right, may miss less along the straight path than the one that is."""
+    which is right, may miss less along the straight path than the one that is. Lags of the laser
+    are asked each: along the straight path the likeliest is any."""
     engine, first = found.engine, found.explanations[0]
     at = _looked_for(engine)
     rows = engine.bench.rows
     single = (e for e in found.explanations if len(e.parts) == 1 and _is_quick(e, at, rows))
     near = (e for e in single if e.log_weight > first.log_weight - _BEHIND)
-    for e in islice(near, _SEVERAL) if at.size else ():
+    for e in (*islice(near, _SEVERAL), *_lags(found)) if at.size else ():
         path = Paths(engine, e, at, None)
         more, gain = path.found() if path.memory else (None, 0.0)
         if not more or not _worth(more, gain, _PAYS):
@@ -110,6 +113,20 @@ def by_one_word(found: SearchResult) -> Iterator[Unseen]:
 
 
 _BEHIND = 1000.0  # nats that a word alone may gain by loads that no row shows
+
+
+def _lags(found: SearchResult) -> Iterator[Explanation]:
+    """Lags of the laser, between delay and filter, as long as they would hardly be noticed."""
+    engine = found.engine
+    if not engine.bench.data.arm:
+        return
+    longest = _NOTICED * sampling_time(engine.bench.rows)
+    shapes = [v for v in found.variants if v.lags_freely and v.lag_s <= longest]
+    for s in score(engine, engine.levels, shapes):
+        yield explain(engine, (Part(s.variant, s.scale),), s.log_evidence)
+
+
+_NOTICED = 2.5  # samples
 
 
 def _looked_for(engine: Engine) -> Ints:
