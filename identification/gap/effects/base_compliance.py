@@ -199,11 +199,9 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
             out.append(bent_column(bench, lever[axis], moment[axis], t.shape["beyond"]))
             continue
         turns = ((axis, axis),) if axis in lever else (("x", "y"), ("y", "x"))
-        out.append(bench.outside_column(sum((lever[a] * moment[b] for a, b in turns), _NONE)))
+        moved = np.sum([lever[a] * moment[b] for a, b in turns], axis=0)
+        out.append(bench.outside_column(moved))
     return out
-
-
-_NONE = np.zeros(1)
 
 
 EFFECT = Effect(

@@ -265,7 +265,8 @@ def _whenever_it_came(bench: Bench, found: Coefficients, times: Array) -> Coeffi
     """Coefficients as uncertain as the moment at which a load came to its level, which no reading
     shows: anywhere on its way there (a rectangular distribution, GUM 4.3.7). What had crept before
     the first reading, `dt / T` of it, is taken for the spring's."""
-    early = np.minimum(unread_way(bench.rows) / 12**0.5 / times, _MOST)
+    way = unread_way(bench.rows) or 0.0
+    early = np.minimum(way / 12**0.5 / times, _MOST)
     moves = found.w * early * (1 + float(np.sum(found.w)))
     return replace(found, cov=found.cov + np.outer(moves, moves))
 

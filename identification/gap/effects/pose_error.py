@@ -287,7 +287,7 @@ def _look_closer(word: Word) -> list[Variant]:
     start = kinds[_kind(best.variant)].variant
     for name in sorted(found, key=lambda w: -marginal(found[w]))[:_BESIDE]:
         again = _beside(engine, start, word.families[name], found[name])
-        finer.append(again.known_by(f" beside {name}", beside=name))
+        finer.append(again.found_beside([name]))
     same = [v for v in finer if _kind(v) == _kind(best.variant)]
     share = best.variant.prior / len(same)  # they are one place, looked at more than once
     return [replace(v, prior=share) if v in same else v for v in finer]

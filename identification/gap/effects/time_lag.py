@@ -204,7 +204,7 @@ def _turning_sd(bench: Bench, lag: float) -> float:
     two samples, so that it took half a sample more or less. What a lag shows at the first sample of
     a hold is the share of that way which it is late."""
     half, way = bench.rows.half_sample, unread_way(bench.rows)
-    return 0.5 * half / max(way, half) * max(lag - half, 0.0) if way else 0.0
+    return 0.0 if way is None else 0.5 * half / max(way, half) * max(lag - half, 0.0)
 
 
 _LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags that are compared

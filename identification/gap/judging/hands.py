@@ -38,22 +38,23 @@ def acts_by_hands_alone(found: SearchResult) -> bool:
     if not best.parts:
         return False
     rows = engine.bench.rows
-    moved = fit(engine, best).contribution(engine, 0)[: rows.n]
+    fitted = fit(engine, best)
+    moved = fitted.contribution(engine, 0)[: rows.n]
     both = rows.about_means(np.column_stack([moved, engine.bench.load])) ** 2
     share, load = both[rows.gone_beyond].sum(axis=0) / np.maximum(both.sum(axis=0), _TINY)
-    return bool(share > max(_MOST, _MORE * load)) and not _same_elsewhere(engine, best)
+    return bool(share > max(_MOST, _MORE * load)) and not _same_elsewhere(engine, best, fitted)
 
 
 _MOST, _MORE, _TINY = 0.5, 2.0, 1e-300
 
 
-def _same_elsewhere(engine: Engine, explanation: Explanation) -> bool:
+def _same_elsewhere(engine: Engine, explanation: Explanation, whole: Fit) -> bool:
     """Whether the holds that no load went beyond show the largest effect for sure, and do as much
-    to themselves by it as all holds together have it."""
+    to themselves by it as all holds together (whole) have it."""
     rows = engine.bench.rows
     kept = ~rows.gone_beyond
     keep = engine.bench.layout.read_in(kept, kept[rows.edges])
-    alone, whole = fit(engine, explanation, keep), fit(engine, explanation)
+    alone = fit(engine, explanation, keep)
     w, covariance = alone.of(0)
     if w @ np.linalg.lstsq(covariance, w, rcond=None)[0] < _SURE:
         return False

@@ -121,11 +121,6 @@ def loads_across(bench: Bench, law: Law, values: Array) -> Array:
     return out
 
 
-def tangent_levers(bench: Bench) -> Array:
-    """(setups, 2, m) m: torque of every joint per newton along either tangent."""
-    return np.stack([s.tangent_lever for s in bench.data.setups])
-
-
 def _acts(bench: Bench, t: Term) -> Flags:
     """(n,) rows in which a term acts."""
     there = (along(bench, t.shape["along"]) > 0) & in_pose(bench, t.shape.get("pose"))

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.across_law import loads_across, tangent_levers
+from identification.gap.laws.across_law import loads_across
 from identification.gap.laws.lags import ahead_of_reading, kinds_of
 from identification.gap.laws.law import Law, in_pose
 from identification.gap.laws.leverage import changes, changes_turned
@@ -45,22 +45,17 @@ def as_it_stands(bench: Bench, acts: Iterable[Acts]) -> Bench:
     acting = [a for a in acts if changes_torques(a.law)]
     if not acting or not bench.data.arm or bench.imposed:
         return bench
-    n = bench.rows.n
-    lever, moment = bench.lever, np.zeros((n, 3))
-    torque, ahead = np.zeros(lever.shape), np.zeros(n)
-    force = np.zeros((n, 3))
+    lever, moment = bench.lever, np.zeros((bench.rows.n, 3))
+    across, ahead = np.zeros((bench.rows.n, 2)), np.zeros(bench.rows.n)
     for law, values in acting:
         longer, more = _levers(bench, law, values)
         lever, moment = lever + longer, moment + more
-        across = loads_across(bench, law, values)
-        setups, setup = bench.data.setups, bench.rows.setup
-        torque = torque + np.einsum("nk,nkj->nj", across, tangent_levers(bench)[setup])
-        force = force + np.einsum(
-            "nk,nkc->nc", across, np.stack([s.tangents for s in setups])[setup]
-        )
+        across = across + loads_across(bench, law, values)
         ahead = ahead + _ahead(bench, law, values)
-    points = np.stack([s.point + np.zeros(3) for s in bench.data.setups])[bench.rows.setup]
-    twist = np.cross(points, force)
+    setups, setup = bench.data.setups, bench.rows.setup
+    torque = np.einsum("nk,nkj->nj", across, np.stack([s.tangent_lever for s in setups])[setup])
+    force = np.einsum("nk,nkc->nc", across, np.stack([s.tangents for s in setups])[setup])
+    twist = np.cross(np.stack([s.point + np.zeros(3) for s in setups])[setup], force)
     return bench.standing(Standing(lever, torque, ahead, moment, force, twist))
 
 

@@ -17,7 +17,6 @@ from identification.arrays import Array, Ints
 from identification.gap.evidence.compare import closest, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import conditioned
 from identification.gap.explanations.fit import weighed
 from identification.gap.laws.law import Laws
 from identification.gap.model.variants import Variant, block
@@ -29,20 +28,16 @@ _DONE = 1e-3  # of a spring
 _LEVELS = 2  # of imperfection, at most, that springs are found with
 
 
-def about_springs(
-    laws: Laws, engine: Engine, found: Variant, beside: tuple[Part, ...] = ()
-) -> Variant:
-    """What goes through the springs, with the springs as they are found to be with it and with
-    other parts beside it."""
+def about_springs(laws: Laws, engine: Engine, found: Variant) -> Variant:
+    """What goes through the springs, with the springs as they are found to be with it alone."""
     out, done = found, list[float]()
     for _ in range(_LEVELS):
-        levels, energy = conditioned(engine, beside)
-        best = closest(score(engine, levels, [out], energy))
+        best = closest(score(engine, engine.levels, [out]))
         eta = float(engine.levels[best.level].eta)
         if eta in done:
             break
         done.append(eta)
-        compliance = springs_found(laws, engine, Part(out, best.scale), beside, eta)
+        compliance = springs_found(laws, engine, Part(out, best.scale), (), eta)
         out = laws.about_springs(engine.bench, found, compliance)
     return out
 

@@ -254,12 +254,12 @@ def standing_on(rows: Rows) -> Array:
     return np.where(rows.hold_starts, last, 0.0)
 
 
-def unread_way(rows: Rows) -> float:
+def unread_way(rows: Rows) -> float | None:
     """s that the load is on its way from one level to the next, which no reading shows: median over
-    holds; 0 of a recording that runs on, or of a single hold."""
+    holds; None of a recording that runs on, or of a single hold."""
     begins = rows.hold_starts & ~rows.starts
     if rows.continuous or not begins.any():
-        return 0.0
+        return None
     gaps = np.diff(rows.session, prepend=rows.session[0])
     return float(np.median((gaps - settling_share(rows) - standing_on(rows))[begins]))
 

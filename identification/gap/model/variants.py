@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
@@ -190,6 +190,11 @@ class Variant:
     def known_by(self, more: str, **facts: Any) -> Variant:
         """The same with more in its label, and the facts that this says."""
         return replace(self, label=f"{self.label}{more}", info={**self.info, **facts})
+
+    def found_beside(self, words: Iterable[str]) -> Variant:
+        """The same, called after the words beside which it was found."""
+        names = " and ".join(sorted(set(words)))
+        return self.known_by(f" beside {names}", beside=names)
 
     @cached_property
     def grid(self) -> tuple[object, ...]:

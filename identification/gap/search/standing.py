@@ -20,6 +20,5 @@ def standing_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
             continue
         found = pose_error.refined(engine, part.variant, rest)
         if pose_error.elsewhere(part.variant, found):
-            names = " and ".join(sorted({p.word for p in rest}))
-            out.append(found.known_by(f" beside {names}", beside=names))
+            out.append(found.found_beside(p.word for p in rest))
     return out

@@ -8,7 +8,6 @@ import numpy as np
 
 from identification.gap.effects import EFFECTS, pose_error
 from identification.gap.evidence.engine import Engine
-from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.laws.springs_found import springs_found
 from identification.gap.model.variants import Variant
@@ -32,10 +31,5 @@ def through_springs_anew(engine: Engine, explanation: Explanation) -> list[Varia
         before = bench.compliance if about is None else about
         if np.abs(compliance / before - 1).max() > _MOVED:
             again = laws.about_springs(bench, part.variant, compliance)
-            out.append(again.known_by(_beside(rest), beside=_beside(rest)))
+            out.append(again.found_beside(p.word for p in rest))
     return out
-
-
-def _beside(parts: tuple[Part, ...]) -> str:
-    names = sorted({p.word for p in parts})
-    return f" beside {' and '.join(names)}" if names else ""

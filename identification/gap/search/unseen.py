@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from math import inf, lgamma, log
 from typing import NamedTuple
 
@@ -102,7 +102,7 @@ def by_one_word(found: SearchResult) -> Iterator[Unseen]:
     rows = engine.bench.rows
     single = (e for e in found.explanations if len(e.parts) == 1 and _is_quick(e, at, rows))
     near = (e for e in single if e.log_weight > first.log_weight - _BEHIND)
-    for e in (*islice(near, _SEVERAL), *_lags(found)) if at.size else ():
+    for e in chain(islice(near, _SEVERAL), _lags(found)) if at.size else ():
         path = Paths(engine, e, at, None)
         more, gain = path.found() if path.memory else (None, 0.0)
         if not more or not _worth(more, gain, _PAYS):
