@@ -68,9 +68,12 @@ def first_of_rows(count: NDArray[np.int_]) -> NDArray[np.bool_]:
 
 
 def strength(bench: Bench, v: Variant, columns: Array, times: float) -> Array:
-    """Coefficients of the prior's main direction (of a knee, the knee) that keep all limits,
-    rms of the response beyond the datum `times` the noise."""
+    """Coefficients of the prior's main direction (of a knee, the knee; of sizes that are free of
+    each other, unlike ones) that keep all limits, rms of the response beyond the datum `times` the
+    noise."""
     unit = np.ones(len(v.columns))
+    if v.each:  # alike in all directions they may come to what a gain does
+        unit /= np.arange(1, len(unit) + 1)
     if "centre" in v.info:
         unit[: len(v.info["radius"])] = np.equal(v.info["radius"], v.info["centre"])
         unit[len(v.info["radius"]) :] = 0.0

@@ -197,10 +197,13 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
         return ()
     words, fitted = " and ".join(best.troubles), fit(found.engine, best)
     off, word = broken(found.engine, best, fitted)
+    asks = what_is_strained(found.engine, fitted, best.eta) if found.engine.bench.data.arm else ""
+    look = " See whether META states too small an uncertainty." if asks else ""
     if off > 1:
+        also = f"asks for {asks}" if asks else "what is allowed explains less"
         text = (
             f"What explains the gap best ({words}) takes a {word} outside what that word allows, "
-            "and what is allowed explains less: it was not believed."
+            f"and {also}: it was not believed.{look}"
         )
         return (Note(REMARK, text),)
     if not found.engine.bench.data.arm:
@@ -211,12 +214,8 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
             "of one sample: a vibration, or a pick-up of the mains. Find it before you go on."
         )
         return (Note(FAULT, text),)
-    asks = what_is_strained(found.engine, fitted, best.eta)
     if not asks:
         return ()
     what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"
-    text = (
-        f"{what} asks for {asks}: it was not believed. "
-        "See whether META states too small an uncertainty."
-    )
+    text = f"{what} asks for {asks}: it was not believed.{look}"
     return (Note(REMARK, text),)
