@@ -218,6 +218,7 @@ def test_a_displacement_that_goes_back_under_more_force_was_misread() -> None:
         "next run",
         "late",
         "datum",
+        "recovers",
     ],
 )
 def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
@@ -247,6 +248,11 @@ def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
         force = np.tile(np.arange(1.0, 11.0), 2)
         u = force / SPRING - 5e-4 * run
     step, branch = np.arange(20), np.ones(20, dtype=np.int64)
+    if what == "recovers":  # of a stroke that is held and let go, read once on the way
+        step = np.repeat([0, 1, 2, 3], [4, 5, 1, 10])
+        u = np.array([0.0, 3e-5, 2e-5, 1e-5])[step]
+        relaxes, recovers = np.linspace(20, 15, 5), np.linspace(-3, 9, 10)
+        force = np.concatenate([np.zeros(4), relaxes, [2.0], recovers])
     if what == "late":  # it is let go, and the force still shows the last step
         force[10], branch[10:] = 9.6, 2
     assert goes_back(bench_data(force, u, step=step, branch=branch, run=run)) is None

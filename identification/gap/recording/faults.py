@@ -274,23 +274,26 @@ _MORE, _BACK = 0.02, 0.1  # of the ranges of force and displacement in a run
 
 def goes_back(data: GapData) -> int | None:
     """First reading of a level that is read further back than the one before it, by far more than
-    the instrument's uncertainty, under a larger force, as nothing goes that is pressed; None where
-    there is none. Of levels at rest: in a running recording glitches are set aside."""
+    the instrument's uncertainty, under a force that is larger throughout, as nothing goes that is
+    pressed: one that relaxes at a stroke recovers after the stroke went back. None where there is
+    none. Of levels at rest: in a running recording glitches are set aside."""
     hold = hold_ids(data)
     if is_continuous(data, hold):
         return None
     first = first_rows(hold)
     count = np.bincount(hold)
     force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
+    least = np.minimum.reduceat(np.abs(data.force), first)
+    most = np.maximum.reduceat(np.abs(data.force), first)
     for run in np.unique(data.run):
         at = np.flatnonzero(data.run[first] == run)
-        size, step = np.abs(force[at]), np.diff(u[at])
+        step = np.diff(u[at])
         way = np.sign(force[at][1:] + force[at][:-1]) * step  # wherever the datum lies
         far = max(_CLEARLY * data.instruments.displacement, _BACK * float(np.ptp(u[at])))
         same = force[at][1:] * force[at][:-1] >= 0
         branch = data.branch[first][at]  # a force that comes late still grows when it is let go
         same &= branch[1:] == branch[:-1]
-        grows = np.diff(size) > _MORE * float(np.ptp(force[at]))
+        grows = least[at][1:] - most[at][:-1] > _MORE * float(np.ptp(force[at]))
         wrong = np.flatnonzero(same & grows & (way < -far))
         if wrong.size:
             return int(first[at[wrong[0] + 1]])
