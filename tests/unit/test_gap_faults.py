@@ -250,7 +250,7 @@ def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
     step, branch = np.arange(20), np.ones(20, dtype=np.int64)
     if what == "recovers":  # of a stroke that is held and let go, read once on the way
         step = np.repeat([0, 1, 2, 3], [4, 5, 1, 10])
-        u = np.array([0.0, 3e-5, 2e-5, 1e-5])[step]
+        u = np.array([0.0, 3e-4, 2e-4, 1e-4])[step]
         relaxes, recovers = np.linspace(20, 15, 5), np.linspace(-3, 9, 10)
         force = np.concatenate([np.zeros(4), relaxes, [2.0], recovers])
     if what == "late":  # it is let go, and the force still shows the last step
