@@ -206,6 +206,15 @@ def test_a_displacement_that_goes_back_under_more_force_was_misread() -> None:
     assert goes_back(bench_data(force, u, run=run, step=step)) == 26
 
 
+def recovering() -> GapData:
+    """A stroke is held, let go and held again; the force relaxes, and recovers."""
+    step = np.repeat([0, 1, 2, 3], [4, 40, 1, 40])
+    relaxes, recovers = 15 + 5 * np.exp(-np.arange(40) / 4), 9 - 12 * np.exp(-np.arange(40) / 4)
+    force = np.concatenate([np.zeros(4), relaxes, [2.0], recovers])
+    u = np.array([0.0, 3e-4, 2e-4, 1e-4])[step]
+    return bench_data(force, u, step=step, branch=np.ones(85, dtype=np.int64))
+
+
 @pytest.mark.parametrize(
     "what",
     [
@@ -249,10 +258,8 @@ def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
         u = force / SPRING - 5e-4 * run
     step, branch = np.arange(20), np.ones(20, dtype=np.int64)
     if what == "recovers":  # of a stroke that is held and let go, read once on the way
-        step = np.repeat([0, 1, 2, 3], [4, 5, 1, 10])
-        u = np.array([0.0, 3e-4, 2e-4, 1e-4])[step]
-        relaxes, recovers = np.linspace(20, 15, 5), np.linspace(-3, 9, 10)
-        force = np.concatenate([np.zeros(4), relaxes, [2.0], recovers])
+        assert goes_back(recovering()) is None
+        return
     if what == "late":  # it is let go, and the force still shows the last step
         force[10], branch[10:] = 9.6, 2
     assert goes_back(bench_data(force, u, step=step, branch=branch, run=run)) is None
