@@ -111,61 +111,56 @@ def _along(x: Array, at: Array, values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class GapData:
-    """n samples in the order of measurement.
+    """A measurement: n samples in the order in which they were taken, with the simulation that
+    was believed. m joints, or the one spring of a rig without an arm."""
 
-    time s within the run; session s, or None; run, setup, repetition, branch, step (n,) ints
-    (step -1: none). force N, displacement m along the direction. tangential (n, 2) N or None: force
-    across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, t) degC or
-    None: of the joints, or what was read of a rig.
-    compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
-    curves: what another simulator predicts, a curve for every setup; None: the springs do.
-    lets_go: whether readings were left out after a part had let go of the stroke (slack.py).
-    timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
-    samples of ramps under the name of the level they lead to (ramps.py). onward (n,) or None: share
-    of its load by which the sample before was followed by more that no sample shows, 0 where it was
-    not. aside, notes: what is to be said of samples that were set aside, and of others.
-    """
-
-    arm: bool
-    setups: tuple[Setup, ...]
-    time: Array
-    session: Array | None
-    run: Ints
-    setup: Ints
-    repetition: Ints
-    branch: Ints
-    step: Ints
-    force: Array
-    displacement: Array
-    compliance: Array
-    compliance_relative_sd: Array
+    arm: bool  # a robot arm; else a rig with one compliance
+    setups: tuple[Setup, ...]  # poses and directions
+    time: Array  # (n,) s within the run; counts samples where `timed` is false
+    session: Array | None  # (n,) s on the clock of the session
+    run: Ints  # (n,) a repetition of a setup
+    setup: Ints  # (n,) index of `setups`
+    repetition: Ints  # (n,) from 1
+    branch: Ints  # (n,) zero, loading, unloading, cycle (`BRANCH_NAMES`)
+    step: Ints  # (n,) number of the load step; -1: none
+    force: Array  # (n,) N along the direction
+    displacement: Array  # (n,) m along the direction
+    compliance: Array  # (m,) rad/Nm as simulated; m/N without an arm
+    compliance_relative_sd: Array  # (m,)
     instruments: Instruments
-    tangential: Array | None = None
-    q: Array | None = None
-    temperature: Array | None = None
+    tangential: Array | None = None  # (n, 2) N across the direction
+    q: Array | None = None  # (n, m) rad: joint readings minus the commanded pose
+    temperature: Array | None = None  # (n, t) degC of the joints, or what was read of a rig
+    # joints are read on the output side of their gears, not at the motor
     output_encoder: bool = True
-    datum: Literal["setup", "repetition"] = "setup"
-    tare: Literal["session", "run"] = "session"
+    datum: Literal["setup", "repetition"] = "setup"  # when the displacement is zeroed
+    tare: Literal["session", "run"] = "session"  # when the force is zeroed
+    # channel that the rig drives; None: to be found
     imposed: Literal["force", "displacement"] | None = None
+    # for every setup what another simulator predicts; None: the springs do
     curves: tuple[Curve, ...] | None = None
-    timed: bool = True
+    timed: bool = True  # the time was recorded
+    # readings were left out after a part had let go of the stroke (lost_contact.py)
     lets_go: bool = False
-    on_the_way: Flags | None = None
+    # (n,) samples of a ramp, under the number of the level that it leads to (ramps.py)
+    in_ramp: Flags | None = None
+    # (n,) overshoot that is known but not recorded: after sample i - 1 and before sample i
+    # the load went beyond its value at i - 1 by the share onward[i] of it
     onward: Array | None = None
-    force_scatters: float = 1.0
-    aside: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    force_scatters: float = 1.0  # times that the force scatters more than stated
+    aside: tuple[str, ...] = ()  # sentences on samples that were set aside
+    notes: tuple[str, ...] = ()  # sentences on other samples
 
     @property
     def ways(self) -> Flags:
         """(n,) samples on the way, none where no ramp was told."""
-        return np.zeros(len(self.run), bool) if self.on_the_way is None else self.on_the_way
+        return np.zeros(len(self.run), bool) if self.in_ramp is None else self.in_ramp
 
     def outside_of(self, setup: Ints) -> Array:
         """(n,) m/N: compliance outside the springs, of the setups of rows (n,)."""
         return np.array([s.outside for s in self.setups])[setup]
 
-    def moment(self, i: int) -> str:
+    def time_label(self, i: int) -> str:
         """When reading i was taken; which one it is, without a clock."""
         return f"at {self.time[i]:.4g} s" if self.timed else f"at reading {i + 1}"
 

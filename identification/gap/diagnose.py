@@ -21,24 +21,29 @@ from identification.gap.evidence.engine import Engine, eta_levels
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import fit
 from identification.gap.judging.choice import chosen_of
-from identification.gap.judging.earned import earned, foretells, learned, left_of
-from identification.gap.judging.hands import acts_by_hands_alone
+from identification.gap.judging.cross_validation import (
+    learned,
+    left_of,
+    predicts_held_out,
+    reweighted_by_validation,
+)
 from identification.gap.judging.heldout import first_repetitions
-from identification.gap.judging.leftover import looked_up
+from identification.gap.judging.residual_checks import reweighted_by_residuals
+from identification.gap.judging.unread_ramps import acts_only_after_overshoot
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
-from identification.gap.recording.digits import as_fine_as_digits
+from identification.gap.recording.digits import with_quantization_noise
 from identification.gap.recording.ends import without_ends
+from identification.gap.recording.force_scatter import with_observed_force_noise
 from identification.gap.recording.glitches import without_glitches
-from identification.gap.recording.ramps import ramps_told
-from identification.gap.recording.slack import without_slack
-from identification.gap.recording.trembling import force_as_it_scatters
-from identification.gap.search.breaks import troubles_of, with_plain_trouble
+from identification.gap.recording.lost_contact import without_lost_contact
+from identification.gap.recording.ramps import with_ramps_marked
+from identification.gap.search.overshoots import Overshoots, by_one_word, overshoots_of_best
 from identification.gap.search.refine import refine
-from identification.gap.search.search import force, search
-from identification.gap.search.strange import with_strangers
-from identification.gap.search.unseen import Unseen, by_one_word, unseen
+from identification.gap.search.search import search, with_forced_words
+from identification.gap.search.unmodelled_running import troubles_of, with_plain_trouble
+from identification.gap.search.unmodelled_shapes import with_unmodelled_evidence
 from identification.gap.words import WORDS
 
 Progress = Callable[[str, float], None]
@@ -78,18 +83,18 @@ def explain_gap(
     withheld, forced = set(withhold), frozenset(add)
     check_words(withheld | forced)
     tell("preparing", 0.0)
-    told = force_as_it_scatters(ramps_told(as_fine_as_digits(data)))
-    bench = make_bench(without_slack(without_glitches(without_ends(told))))
+    told = with_observed_force_noise(with_ramps_marked(with_quantization_noise(data)))
+    bench = make_bench(without_lost_contact(without_glitches(without_ends(told))))
     engine, variants = _prepared(bench, known, withheld)
     _check_shown(forced, variants)
     tell("comparing effects", 0.2)
     found = _with_unseen(_searched(engine, variants), known, withheld)
     found, gone = _without_what_is_gone(found, bench, known, withheld)
     tell("withheld data", 0.7)
-    found = learned(earned(found), withheld)
+    found = learned(reweighted_by_validation(found), withheld)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     plain, fuller = chosen_of(found, verdict)
-    chosen = force(found.engine, found.variants, found.explanations, plain, forced)
+    chosen = with_forced_words(found.engine, found.variants, found.explanations, plain, forced)
     chosen, each = settled(found.engine, found.variants, chosen, found.explanations)
     result = with_twins(result_of(found, verdict, chosen, each, fuller), chosen, withheld)
     result = replace(result, gone=gone)
@@ -122,12 +127,12 @@ def _searched(engine: Engine, variants: Sequence[Variant]) -> SearchResult:
     names."""
     singles = score(engine, engine.levels, variants)
     finer = refine(engine, singles)
-    nameless = troubles_of(engine.bench, engine.base, engine.target)
-    for fresh in (finer, nameless):
+    unmodelled = troubles_of(engine.bench, engine.base, engine.target)
+    for fresh in (finer, unmodelled):
         if fresh:
             singles += score(engine, engine.levels, fresh)
-    found = search(engine, [*variants, *finer, *nameless], singles)
-    return looked_up(with_strangers(with_plain_trouble(found)))
+    found = search(engine, [*variants, *finer, *unmodelled], singles)
+    return reweighted_by_residuals(with_unmodelled_evidence(with_plain_trouble(found)))
 
 
 def _without_what_is_gone(
@@ -156,13 +161,15 @@ def _with_unseen(
     found, paid = _by_one_word(found, known, withheld)
     paid_off = not paid or found.explanations[0].log_weight - first > _PAYS * paid
     for i in range(_ROUNDS):
-        foretold = foretells(found)
+        foretold = predicts_held_out(found)
         if _hopeless(found, foretold, paid_off):
             break
         tellers: list[Flags | None] = [] if foretold else [first_repetitions(found.engine)]
         if foretold or i == 0:
             tellers.append(None)  # all rows
-        for more in filter(None, (unseen(found, told_by) for told_by in tellers)):
+        for more in filter(
+            None, (overshoots_of_best(found, calibration_rows) for calibration_rows in tellers)
+        ):
             again = _better_along(found, more, more.cost - paid, foretold, known, withheld)
             if again is not None:
                 break
@@ -181,7 +188,7 @@ def _by_one_word(
 ) -> tuple[SearchResult, float]:
     """The search once more with the loads that one word alone asks for, and nats that it takes to
     say which, where that word then explains more than the best explanation does without."""
-    if _hopeless(found, foretells(found), paid_off=True):
+    if _hopeless(found, predicts_held_out(found), paid_off=True):
         return found, 0.0
     best, loads, clean = found.explanations[0].log_weight, None, frozenset[str]()
     for more in by_one_word(found):
@@ -190,7 +197,7 @@ def _by_one_word(
         others = {w for w in WORDS if w not in more.words}
         asking = _along(found, more, known, {*withheld, *others})
         ahead = asking.explanations[0].log_weight - more.cost
-        if ahead > best and not acts_by_hands_alone(asking):
+        if ahead > best and not acts_only_after_overshoot(asking):
             best, loads = ahead, more
             left = asking.explanations[0].eta > found.engine.bench.noise.stated
             clean = frozenset() if left else more.words
@@ -204,7 +211,7 @@ def _by_one_word(
 
 def _better_along(
     found: SearchResult,
-    more: Unseen,
+    more: Overshoots,
     cost: float,
     foretold: bool,
     known: Sequence[Form],
@@ -239,12 +246,12 @@ def _explains_more(again: SearchResult, cost: float, found: SearchResult, foreto
     """More than it costs beyond what was paid, nats; or at all, and foretells what was not; by
     what acts at other levels too."""
     gain = again.explanations[0].log_weight - found.explanations[0].log_weight
-    pays = gain > cost or (not foretold and gain > 0 and foretells(again))
-    return pays and not acts_by_hands_alone(again)
+    pays = gain > cost or (not foretold and gain > 0 and predicts_held_out(again))
+    return pays and not acts_only_after_overshoot(again)
 
 
 def _along(
-    found: SearchResult, more: Unseen, known: Sequence[Form], withheld: Collection[str]
+    found: SearchResult, more: Overshoots, known: Sequence[Form], withheld: Collection[str]
 ) -> SearchResult:
     """The search once more with those loads."""
     data = found.engine.bench.data

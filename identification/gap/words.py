@@ -59,4 +59,4 @@ LATE = frozenset({"joint_creep", "time_lag"})  # what comes after the load
 
 # Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.
 JERKS, DAMAGE, SOFTENING, WANDERS = "jerks", "damage", "softening", "wanders"
-NAMELESS = (JERKS, DAMAGE, SOFTENING, WANDERS)
+UNMODELLED = (JERKS, DAMAGE, SOFTENING, WANDERS)

@@ -134,7 +134,11 @@ def diagnose(
             "out."
         )
     read = None if model is None else load_model(model)
-    given = _Believed(gap_data(dataset)) if read is None else _believing(dataset, read)
+    given = (
+        _SimulationOfModel(gap_data(dataset))
+        if read is None
+        else _simulation_of_model(dataset, read)
+    )
     data = given.data if simulation is None else with_curves(given.data, simulation)
     out, forced = tuple(withhold), tuple(add)
     for option, words in (("--withhold", out), ("--add", forced)):
@@ -170,7 +174,7 @@ def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
     return said(result), lambda: said(whole())
 
 
-class _Believed(NamedTuple):
+class _SimulationOfModel(NamedTuple):
     """The data with springs, links and mounting of a model as their simulation; laws of the effects
     that it has; these effects, as the model writes them; words of it that are left out."""
 
@@ -180,7 +184,7 @@ class _Believed(NamedTuple):
     behind: tuple[str, ...] = ()
 
 
-def _believing(dataset: Dataset, read: ArmModel) -> _Believed:
+def _simulation_of_model(dataset: Dataset, read: ArmModel) -> _SimulationOfModel:
     """InputError for a model of another robot."""
     effects = effects_of(read)
     if read.arm.name != dataset.meta.robot:
@@ -197,7 +201,7 @@ def _believing(dataset: Dataset, read: ArmModel) -> _Believed:
     )
     words = {*effects.contained, *(f.word for f in effects.lasting)}
     known = tuple(e for e in read.effects if e["name"] in words)
-    return _Believed(data, effects.lasting, known, effects.left_behind)
+    return _SimulationOfModel(data, effects.lasting, known, effects.left_behind)
 
 
 def _looks_like(r: GapResult) -> dict[str, Any] | None:

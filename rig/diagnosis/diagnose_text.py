@@ -11,7 +11,7 @@ from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from identification.gap.answer.result import EffectFound, GapResult
-    from identification.gap.explanations.explanation import Likeness
+    from identification.gap.explanations.explanation import GapPattern
     from identification.gap.laws.interval import Parameter
     from identification.gap.model.bench import Bench
 
@@ -136,7 +136,7 @@ NOTED = {
 DOUBTED = next(iter(NOTED))
 
 
-def looks_like(like: Likeness, *, arm: bool = True) -> str:
+def looks_like(like: GapPattern, *, arm: bool = True) -> str:
     """In words, with the period in its unit."""
     period = like.period or 0.0
     told = [f"{brief(t, 3)} s" for t in (period, _SURE * period)]

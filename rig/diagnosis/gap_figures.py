@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from identification.gap.answer.remainder import Remainder, remainder
 from rig.diagnosis.diagnose import Diagnosis
 from rig.diagnosis.gap_curve import curve
-from rig.diagnosis.gap_left import remaining, residual
 from rig.diagnosis.gap_map import gap_map
 from rig.diagnosis.gap_points import (
     Points,
@@ -23,6 +22,7 @@ from rig.diagnosis.gap_points import (
     write_table,
 )
 from rig.diagnosis.gap_ranking import probabilities, ranked, withheld
+from rig.diagnosis.gap_residual import remaining, residual
 from rig.errors import InputError
 from rig.plotting import watermark, write_figures
 from rig.storage.files import legible

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from rig.diagnosis.gap_curve import curve
-from rig.diagnosis.gap_left import remaining
 from rig.diagnosis.gap_map import gap_map
 from rig.diagnosis.gap_points import held_table, point_table, remainder_table
 from rig.diagnosis.gap_ranking import withheld
+from rig.diagnosis.gap_residual import remaining
 from rig.report.document import Figure
 from rig.report.drawing import draw
 from rig.report.figures import watermark

@@ -12,7 +12,7 @@ from typing import Protocol
 
 
 class Law(Protocol):
-    """One element's law; state advances only by `take`.
+    """One element's law; state advances only by `advance`.
 
     `dt` is the length in seconds of the step at whose end the load is `load`; infinity stands for
     "until nothing moves any more".
@@ -21,10 +21,10 @@ class Law(Protocol):
     def respond(self, load: float, dt: float) -> float:
         """The deflection that a step would end with; changes nothing. Must not fall with load."""
 
-    def take(self, load: float, dt: float) -> float:
+    def advance(self, load: float, dt: float) -> float:
         """Does the step and returns its deflection."""
 
-    def retake(self, dt: float) -> None:
+    def return_to_position(self, dt: float) -> None:
         """The controller, for `dt` seconds, brings the unloaded joint back to its position."""
 
 
@@ -56,13 +56,13 @@ class Spring:
             return settled
         return (1.0 - self.delayed) * settled + self._delayed_part(settled, dt)
 
-    def take(self, load: float, dt: float) -> float:
+    def advance(self, load: float, dt: float) -> float:
         """Remembers how far the delayed share has come."""
         settled = self._settled(load)
         self._late = self._delayed_part(settled, dt)
         return (1.0 - self.delayed) * settled + self._late
 
-    def retake(self, dt: float) -> None:
+    def return_to_position(self, dt: float) -> None:
         """A spring is back by itself."""
 
 
@@ -88,12 +88,12 @@ class Yield:
             return (load + self.threshold) / self.hardening
         return self._remaining
 
-    def take(self, load: float, dt: float) -> float:
+    def advance(self, load: float, dt: float) -> float:
         """Remembers the remaining deflection."""
         self._remaining = self.respond(load, dt)
         return self._remaining
 
-    def retake(self, dt: float) -> None:
+    def return_to_position(self, dt: float) -> None:
         """What remains shrinks at a steady rate."""
         left = max(0.0, abs(self._remaining) - self.return_per_s * dt)
         self._remaining = math.copysign(left, self._remaining)

@@ -141,7 +141,7 @@ class World:
         self._force = 0.0
         self._compliance = 1.0 / SCREW_STIFFNESS_N_PER_M
         self._aim()
-        self._retake(math.inf)
+        self._return_to_position(math.inf)
         self.state = self._take(0.0, math.inf)
 
     def _aim(self) -> None:
@@ -204,17 +204,17 @@ class World:
     def _return_joints(self, dt: float) -> None:
         """The controller brings the arm back, and the hand keeps the screw off its way."""
         before = self._displacement(0.0, 0.0)
-        self._retake(dt)
+        self._return_to_position(dt)
         after = self._displacement(0.0, 0.0)
         away = min(before - after, self.advance_m - after)
         if away > 0:
             self.advance_m -= away
             self.target_m -= away
 
-    def _retake(self, dt: float) -> None:
+    def _return_to_position(self, dt: float) -> None:
         for element in self._elements:
             for law in element.laws:
-                law.retake(dt)
+                law.return_to_position(dt)
 
     def _redraw_at_contact(self, reach: float) -> None:
         # A touch that never carried load seats nothing: how often the hand feels for the arm must
@@ -242,7 +242,7 @@ class World:
         total = 0.0
         for lever, element in self._active:
             load = lever * force
-            deflection = (1.0 + self._relative) * sum(law.take(load, dt) for law in element.laws)
+            deflection = (1.0 + self._relative) * sum(law.advance(load, dt) for law in element.laws)
             total += lever * deflection
             if element.joint is not None:
                 joints[element.joint] += deflection

@@ -130,4 +130,4 @@ def test_a_joint_that_does_next_to_nothing_is_not_one_of_several() -> None:
     assert petty.log_weight < -5000.0
     rubs = Sizes(np.array([1e-5, 2e-6]), np.array([1e-5, 2e-6]), 1e-10)
     assert minor_parts(found.engine, (first, second), rubs) == 0.0
-    assert both.troubles["joint_hysteresis"] == pytest.approx(np.hypot(*both.sizes))
+    assert both.rms_by_word["joint_hysteresis"] == pytest.approx(np.hypot(*both.sizes))

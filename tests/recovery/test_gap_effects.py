@@ -16,7 +16,7 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import EFFECTS, library
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
-from identification.gap.search.unseen import unseen
+from identification.gap.search.overshoots import overshoots_of_best
 from identification.gap.words import WORDS
 from rig.diagnosis.diagnose import Diagnosis, diagnose
 from rig.diagnosis.gap_data import gap_data
@@ -106,7 +106,7 @@ def test_what_the_law_of_a_yield_misses_is_no_hand_that_went_too_far() -> None:
     assert best.eta > 0
     assert best.words == {"joint_yield"}  # which remembers
     assert len(bench.rows.edges) > 50  # enough to be looked at
-    assert unseen(found) is None
+    assert overshoots_of_best(found) is None
 
 
 def test_creep_fraction_and_time() -> None:

@@ -14,7 +14,7 @@ from identification.gap.answer.discriminate import NextMeasurement, Option
 from identification.gap.answer.locate import Where
 from identification.gap.answer.notes import ASIDE, UNDECIDED, Note
 from identification.gap.answer.result import EffectFound, GapResult
-from identification.gap.explanations.explanation import Likeness
+from identification.gap.explanations.explanation import GapPattern
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
 from identification.joints import JointFit, Observation, Prior
@@ -185,7 +185,7 @@ def unexplained() -> Diagnosis:
     where = Where(
         ("x", "y"), (), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,), (), False, 0.4
     )
-    swings = Likeness("swings", 121.4, -80.0)
+    swings = GapPattern("swings", 121.4, -80.0)
     return Diagnosis(
         "id",
         _gap(

@@ -174,7 +174,7 @@ def test_explanations_that_matter_are_taken_between_the_levels(
     ranked = [said((part(w, [0]),), (1e-6,), g) for w, g in zip(words, (0, -4, -50), strict=True)]
     found = _sharpened(engine, [*ranked, said((), (), -60.0)])
     assert [e.log_weight for e in found] == [-3.0, -10.0, -50.0, -60.0]
-    assert [e.log_good for e in found] == [-3.0, -10.0, -50.0, -60.0]
+    assert [e.log_adequate for e in found] == [-3.0, -10.0, -50.0, -60.0]
     assert asked == ["joint_creep", "joint_yield"]  # what is hopeless is left as it is
     more = {"joint_creep": 20.0, "joint_yield": 26.0}  # the first one's gain shuts out nobody
     found = _sharpened(engine, [*ranked, said((), (), -60.0)])

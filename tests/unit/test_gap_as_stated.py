@@ -11,9 +11,14 @@ import pytest
 
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
-from identification.gap.evidence.stiffness import nats_of
+from identification.gap.evidence.lognormal_springs import nats_of
 from identification.gap.explanations.explanation import Explanation, SearchResult
-from identification.gap.judging.leftover import ARM_AS_STATED, AS_STATED, FOR_NOTHING, looked_up
+from identification.gap.judging.residual_checks import (
+    ARM_AS_STATED,
+    AS_STATED,
+    FOR_NOTHING,
+    reweighted_by_residuals,
+)
 from identification.gap.model.base import base_columns
 from identification.gap.search.search import search
 from tests.explained import explained
@@ -44,7 +49,7 @@ def test_a_linear_effect_is_named_only_where_something_is_off(off: float, fault:
     both = said(tuple(part(word, [0]) for word in (SLANT, "pose_error")), (1e-5, 5e-6), 6.0)
     mixed = said(tuple(part(word, [0]) for word in (SLANT, CURVE)), (1e-5, 5e-6), 6.0)
     found = found_off(off, (*each, both, mixed, said((), ())))
-    weights = {e.words: e.log_weight for e in looked_up(found).explanations}
+    weights = {e.words: e.log_weight for e in reweighted_by_residuals(found).explanations}
     less = 0.0 if fault else FOR_NOTHING
     for words, lost in (
         ({SLANT}, less),
@@ -58,8 +63,8 @@ def test_a_linear_effect_is_named_only_where_something_is_off(off: float, fault:
 
 def test_of_an_arm_nothing_is_wrong_while_springs_are_as_stated() -> None:
     for off, kept in ((2.0, 1.0), (ARM_AS_STATED, 0.5), (6.0, 0.04)):
-        (none,) = looked_up(found_off(off, (said((), ()),))).explanations
-        assert np.exp(none.log_good - none.log_weight) == pytest.approx(kept, rel=0.1)
+        (none,) = reweighted_by_residuals(found_off(off, (said((), ()),))).explanations
+        assert np.exp(none.log_adequate - none.log_weight) == pytest.approx(kept, rel=0.1)
         assert none.log_weight == said((), ()).log_weight  # the rest is nobody's
 
 

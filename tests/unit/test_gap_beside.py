@@ -12,7 +12,7 @@ from identification.gap.explanations import explanation
 from identification.gap.explanations.explanation import _ranking_sizes
 from identification.gap.explanations.penalties import _apart, _on_its_own, _same_element
 from identification.gap.model.bench import make_bench
-from identification.gap.recording.course import Course
+from identification.gap.recording.load_history import LoadHistory
 from identification.gap.words import DAMAGE, JERKS, SOFTENING, WANDERS
 from tests.unit.small_explanations import part, replace_bench, small_engine_of
 from tests.unit.test_gap_evidence import small_bench, small_engine
@@ -117,7 +117,7 @@ def test_of_creep_and_friction_in_an_imposed_stroke_the_needed_one_is_larger(
 ) -> None:
     """Each brings a mean stiffness, which the spring takes over; at one rate the friction is, from
     which creep differs in details only."""
-    monkeypatch.setattr(Course, "one_rate", one_rate)
+    monkeypatch.setattr(LoadHistory, "one_rate", one_rate)
     engine = small_engine_of(small_bench())
     engine = replace_bench(engine, replace(engine.bench, imposed=imposed))
     monkeypatch.setattr(explanation, "needed", lambda *_: np.array([36.0, 250.0]))
@@ -136,14 +136,14 @@ def test_in_loops_at_one_rate_what_rubs_is_larger_than_what_comes_late(
     parts = part(late, [0]), part("joint_hysteresis", [1])
     sizes = Sizes(np.array([5e-7, 2e-7]), np.array([8e-6, 8e-6]), 0.0)
     for one_rate, larger in ((True, 1), (False, 0)):
-        monkeypatch.setattr(Course, "one_rate", one_rate)
+        monkeypatch.setattr(LoadHistory, "one_rate", one_rate)
         assert _ranking_sizes(engine, parts, sizes, 0).argmax() == larger
 
 
 def test_a_trace_of_friction_beside_a_lag_is_not_what_leads(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(Course, "one_rate", True)
+    monkeypatch.setattr(LoadHistory, "one_rate", True)
     engine = small_engine_of(small_bench())
     parts = part("time_lag", [0]), part("joint_yield", [1])
     for share, larger in ((0.1, 0), (0.3, 1)):

@@ -21,7 +21,7 @@ from identification.gap.judging.choice import (
     WORTH,
     WORTH_OF_THIRD,
     chosen_of,
-    foresees,
+    passes_validation,
 )
 from identification.gap.model.variants import variant
 from tests.unit.small_explanations import part
@@ -147,7 +147,7 @@ def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
         for words in ((CURVE, LAG), (CURVE, LAG, ASKEW), (CURVE, ASKEW))
     )
     told = replace(found(two), kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
-    assert [foresees(told, e) for e in (two, three, other)] == [False, False, True]
+    assert [passes_validation(told, e) for e in (two, three, other)] == [False, False, True]
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_what_does_too_little_to_be_named_is_told() -> None:
     assert "400 nats more" in note.text
     assert "--add time_lag." in note.text
     assert "most of" not in note.text
-    (most,) = left_out(one, two, 1.5 * two.troubles[LAG])
+    (most,) = left_out(one, two, 1.5 * two.rms_by_word[LAG])
     assert "400 nats more, most of the 0.0015 mm that are left. " in most.text
     assert not left_out(two, two, 1.0)  # it was asked for
     large = said({CURVE: 1.0, LAG: 0.9}, 400.0)

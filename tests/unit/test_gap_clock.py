@@ -11,9 +11,9 @@ from identification.gap.answer.notes import notes_of
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import sampling_time
 from identification.gap.recording.rows import reduce_rows
+from tests.unit.test_gap_force_drops import saw, stroke
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_running import SPRING, running, triangle
-from tests.unit.test_gap_snaps import saw, stroke
 
 
 def test_one_wrong_stamp_says_nothing_of_the_time_between_samples() -> None:

@@ -15,7 +15,7 @@ from identification.gap.effects import EFFECTS, joint_backlash, joint_hysteresis
 from identification.gap.evidence.compare import by_word, closest, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.laws import knees_closer
-from identification.gap.laws.closer import Word, closing_in
+from identification.gap.laws.closer import RefinementTarget, closing_in
 from identification.gap.laws.friction_forms import REACHES, SATURATES
 from identification.gap.laws.friction_law import EXPONENTIAL, SLIPPING, parameters
 from identification.gap.laws.interval import NOMINAL, Coefficients
@@ -299,7 +299,9 @@ def test_what_shows_nothing_is_not_looked_at_closely(word: str) -> None:
         beside_it = [s._replace(log_evidence=lead + beside) for s in mine]
         finer = EFFECTS[word].finer
         assert finer is not None
-        return len(finer(Word(engine, families, [words[0], word], families[word], beside_it)))
+        return len(
+            finer(RefinementTarget(engine, families, [words[0], word], families[word], beside_it))
+        )
 
     few, many = told(0.5, 1.0), told(0.5, 20.0)
     assert few == 0 if word != "joint_backlash" else few < many
@@ -330,7 +332,7 @@ def test_plays_are_closed_in_on_only_where_one_shows(
     families["joint_backlash"] = alone
     seen = [mine._replace(log_evidence=lead + beside)]
     assert joint_backlash.EFFECT.finer is not None
-    joint_backlash.EFFECT.finer(Word(engine, families, list(families), alone, seen))
+    joint_backlash.EFFECT.finer(RefinementTarget(engine, families, list(families), alone, seen))
     assert looked[0] == (joint_backlash.CLOSE if closely else joint_backlash.CLOSE[:1])
 
 

@@ -195,9 +195,9 @@ def test_friction_beside_it_does_not_hide_a_play(monkeypatch: pytest.MonkeyPatch
     assert said[both.words].words == {PLAY, FRICTION}
     bench = result.engine.bench
     few = replace(bench, load=np.round(bench.load / np.ptp(bench.load), 1))
-    few.__dict__["course"] = SimpleNamespace(one_sided=False)
+    few.__dict__["load_history"] = SimpleNamespace(one_sided=False)
     assert spoken_for(cast(Engine, SimpleNamespace(bench=few)), (both, *ranked)) == {}
-    bench.__dict__["course"] = SimpleNamespace(one_sided=True)
+    bench.__dict__["load_history"] = SimpleNamespace(one_sided=True)
     assert spoken_for(result.engine, (both, *ranked)) == {}
 
 

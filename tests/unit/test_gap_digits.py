@@ -9,7 +9,7 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.model.bench import make_bench
-from identification.gap.recording.digits import as_fine_as_digits, step_of
+from identification.gap.recording.digits import step_of, with_quantization_noise
 from rig.diagnosis.diagnose_text import render
 from tests.explained import explained
 from tests.unit.arm_as_read import as_read, levels_of
@@ -76,7 +76,7 @@ def test_levels_of_one_pass_are_no_lattice_however_well_they_are_met(levels: lis
 def test_runs_that_are_zeroed_each_are_read_in_the_same_steps() -> None:
     data = read(5e-6)
     shift = np.array([0.0, 1.7e-6, -0.9e-6])[data.run]
-    found = as_fine_as_digits(replace(data, displacement=data.displacement + shift))
+    found = with_quantization_noise(replace(data, displacement=data.displacement + shift))
     assert found.instruments.displacement == pytest.approx(5e-6 / 12**0.5)
 
 
@@ -90,12 +90,12 @@ def test_levels_that_somebody_set_are_no_digits(levels_N: np.ndarray) -> None:
     rng, moved = np.random.default_rng(6), SPRING * np.tile(levels_N, 3)
     exact = bench_data(np.tile(levels_N, 3), moved + rng.normal(0, 1e-8, len(moved)))
     exact = replace(exact, instruments=replace(exact.instruments, force=1e-3, displacement=1e-9))
-    assert as_fine_as_digits(exact) is exact
+    assert with_quantization_noise(exact) is exact
 
 
 def test_digits_finer_than_what_is_stated_change_nothing() -> None:
     data = read(3e-7, 0.06)
-    assert as_fine_as_digits(data) is data
+    assert with_quantization_noise(data) is data
 
 
 @pytest.mark.parametrize(("laser_m", "converter_N"), [(5e-6, 0.0), (0.0, 0.488), (5e-6, 0.488)])

@@ -35,12 +35,12 @@ def line(n: int = N) -> Array:
     return SPRING * np.linspace(0.0, 1e-3, n)
 
 
-def broken(at: int, left: float = 5.0) -> Array:
+def limit_violation(at: int, left: float = 5.0) -> Array:
     return np.where(np.arange(N) < at, line(), left)
 
 
 def test_a_few_readings_after_a_break_are_set_aside_and_said() -> None:
-    found = explained(recording(broken(N - 6)))
+    found = explained(recording(limit_violation(N - 6)))
     assert len(found.bench.data.force) == N - 6
     assert found.verdict == "none"
     (note,) = [n for n in found.notes if "a break" in n]
@@ -51,13 +51,13 @@ def test_a_few_readings_after_a_break_are_set_aside_and_said() -> None:
 
 
 def test_a_break_that_takes_two_readings_ends_where_most_of_it_falls() -> None:
-    force = broken(N - 6)
+    force = limit_violation(N - 6)
     force[N - 7] *= 0.93
     assert np.flatnonzero(after_break(recording(force)))[0] == N - 6
 
 
 def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
-    data = recording(broken(N - 50))
+    data = recording(limit_violation(N - 50))
     assert without_ends(data) is data
     found = explained(data)
     assert found.verdict == "unknown"
@@ -65,7 +65,7 @@ def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
 
 
 def test_a_break_is_told_by_its_reading_where_no_clock_was_recorded() -> None:
-    unclocked = [replace(recording(broken(N - left)), timed=False) for left in (6, 50)]
+    unclocked = [replace(recording(limit_violation(N - left)), timed=False) for left in (6, 50)]
     (note,) = without_ends(unclocked[0]).aside
     assert "goes on (at reading 155): a break." in note
     (fault,) = [f for f in found_in(unclocked[1]) if f.kind == BROKEN]
@@ -129,9 +129,9 @@ def test_what_ends_nearly_flat_flows_rather_than_bends() -> None:
     u = np.linspace(0.0, 1e-3, N)
     flat = 60.0 * np.tanh(4 * SPRING * u / 60.0)
     flows, bends = make_bench(recording(flat)), make_bench(recording(60.0 * np.tanh(2e3 * u)))
-    assert flows.course.flows_out
-    assert not bends.course.flows_out  # to a seventh of its stiffness
-    assert not make_bench(recording(flat, u + 1e-4 * np.sin(np.arange(N)))).course.flows_out
+    assert flows.load_history.flows_out
+    assert not bends.load_history.flows_out  # to a seventh of its stiffness
+    assert not make_bench(recording(flat, u + 1e-4 * np.sin(np.arange(N)))).load_history.flows_out
     words = frozenset({"joint_nonlinear_stiffness"})
     assert prior_of(words, flows) < prior_of(words, bends) - 10.0
     both = words | {"joint_yield"}
@@ -167,7 +167,7 @@ def test_a_line_far_off_that_bends_within_the_noise_is_a_spring(
 def test_a_force_that_grows_while_the_reading_stands_is_no_hold() -> None:
     """An extensometer that grips late."""
     u = np.maximum(np.linspace(-4e-4, 1e-3, N), 0.0)
-    assert make_bench(recording(line(), u)).course.never_held
+    assert make_bench(recording(line(), u)).load_history.never_held
     held = np.minimum(np.linspace(0.0, 1.4e-3, N), 1e-3)
     relaxing = SPRING * held * np.where(held < 1e-3, 1.0, np.linspace(1.3, 0.6, N))
-    assert not make_bench(recording(relaxing, held)).course.never_held
+    assert not make_bench(recording(relaxing, held)).load_history.never_held

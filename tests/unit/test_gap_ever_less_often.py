@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.model.history import delayed, standing_on
+from identification.gap.model.history import delayed, hold_time_after_row
 from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -27,7 +27,7 @@ def test_a_load_stands_until_after_the_last_reading() -> None:
     after_the_row = last - rows.session[begins - 1]
     assert np.all(after_the_row > 100.0)
     leaves = last + rows.half_sample
-    assert standing_on(rows)[begins] == pytest.approx(leaves - rows.session[begins - 1])
+    assert hold_time_after_row(rows)[begins] == pytest.approx(leaves - rows.session[begins - 1])
     # and so for what only comes late: between leaving one load and coming to the next all is on its
     # way, and nothing before
     delay = 100.0

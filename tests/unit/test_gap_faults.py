@@ -335,7 +335,7 @@ def test_channels_that_count_in_opposite_senses_are_told_where_they_do() -> None
     assert goes_against(everywhere) == ("P1/x", "P1/y", "P2/x", "P2/y")
     one = replace(data, displacement=np.where(data.setup == 1, -1, 1) * data.displacement)
     assert goes_against(one) == ("P1/y",)
-    course = make_bench(everywhere).course
+    course = make_bench(everywhere).load_history
     (fault,) = course.faults
     assert fault.kind == SIGNS  # and not that it goes back, as it does all the time
     assert goes_back(everywhere) is not None

@@ -23,7 +23,6 @@ from rig.diagnosis.diagnose_text import LEAST_PROBABILITY, _share, render
 from rig.diagnosis.gap_curve import curve, legs
 from rig.diagnosis.gap_figures import draw
 from rig.diagnosis.gap_layout import GREEN, blank, noise_axis
-from rig.diagnosis.gap_left import residual
 from rig.diagnosis.gap_map import _cells, _lines
 from rig.diagnosis.gap_points import (
     FALLING,
@@ -36,6 +35,7 @@ from rig.diagnosis.gap_points import (
     write_table,
 )
 from rig.diagnosis.gap_ranking import change, probabilities, withheld
+from rig.diagnosis.gap_residual import residual
 from rig.digits import likely
 from rig.report.gap_view import view_of
 from rig.tables import import_table

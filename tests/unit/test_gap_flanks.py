@@ -312,7 +312,7 @@ def test_from_one_side_both_flanks_of_a_play_have_to_be_seen() -> None:
     """What is soft where the load begins is a seat."""
     x = to_and_fro(low=0.0)
     bench = a_bench(x, x + 0.4 * np.tanh(x / 0.03), "force")
-    assert bench.course.one_sided
+    assert bench.load_history.one_sided
     made = joint_backlash.variants(bench)
     assert made
     for v in [*made, *(f for m in made[:4] for f in joint_backlash.refined(bench, m))]:

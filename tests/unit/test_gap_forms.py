@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.answer.equivalent_places import equivalent_place
 from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
 from identification.gap.answer.known import NotKnown, knowing
 from identification.gap.answer.notes import notes_of
-from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.effects.joint_hysteresis import REACHES
@@ -416,7 +416,7 @@ def test_yield_of_joint_1_and_slip_about_the_vertical_are_twins_without_readings
     target = there.observed - prediction(there)
     engine = Engine(there, base_columns(there), target, np.array([0.0, 1e-6]))
     w = np.full(len(v.columns), 4.0)
-    twin = twin_of(engine, part, w, 0.0)
+    twin = equivalent_place(engine, part, w, 0.0)
     if readings:
         assert twin is None
         return

@@ -21,7 +21,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.gains import factor
-from identification.gap.laws.interval import Coefficients, Softer
+from identification.gap.laws.interval import Coefficients, ComplianceChange
 from identification.gap.model.bench import Bench, make_bench
 from rig.diagnosis.gap_model import springs
 from tests.conformance.gap_designs import linear
@@ -118,7 +118,7 @@ def of_gain(bench: Bench, word: str, off: float, sd: float, spring: float) -> tu
     sd, and as a spring is known to a share of what it carries."""
     carries = 1 - off
     variance = sd**2 + (carries * spring) ** 2
-    softer = Softer({0: 0.0}, {0: spring**2}, {0: np.array([carries * spring**2])})
+    softer = ComplianceChange({0: 0.0}, {0: spring**2}, {0: np.array([carries * spring**2])})
     found = Coefficients(np.array([off]), np.array([[variance]]), softer)
     p = factor(bench, part(word, [0]).variant, found)["factor"]
     assert 0 < p.low < p.value < p.high

@@ -148,7 +148,7 @@ def test_an_effect_does_not_move_to_a_joint_where_it_would_do_nothing() -> None:
     """Two that share a joint are charged for that; but what leaves it must still be an effect. (Of
     an arm: a rig without one has no second joint in the same direction.)"""
     bench = make_bench(replace(small_bench().data, arm=True))
-    object.__setattr__(bench, "likelier_joints", np.zeros(5))  # of its five, one is real
+    object.__setattr__(bench, "joint_log_priors", np.zeros(5))  # of its five, one is real
     engine = small_engine(bench)
     idle = bench.add(1e-9 * engine.bench.columns[1])
     target = engine.target + 4.0 * bench.columns[0]

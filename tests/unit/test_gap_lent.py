@@ -11,7 +11,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, explain, up_to_likeliest
 from identification.gap.model.variants import Variant, variant
 from identification.gap.search import search
-from tests.unit.test_gap_earned import BUMP, REPETITIONS, engine
+from tests.unit.test_gap_cross_validation import BUMP, REPETITIONS, engine
 
 LAW, BESIDE, NEARLY = "contact_seating", "zero_shift", "base_compliance"
 

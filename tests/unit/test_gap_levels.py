@@ -14,7 +14,7 @@ from identification.gap.data import GapData, Instruments
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence.engine import Engine
-from identification.gap.evidence.products import White
+from identification.gap.evidence.products import WhitenedColumns
 from identification.gap.laws import knees_closer
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import _paths
@@ -98,7 +98,7 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
     data = gap_data(load(tmp_path / "d.h5"))
     assert data.timed is clock
     bench = make_bench(data)
-    assert bench.course.timeless is not clock
+    assert bench.load_history.timeless is not clock
     knee = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
     assert any(" flow " in v.label for v in knees_closer.refined(bench, knee)) is clock
     words = {v.word for v in library(bench, ["joint_creep", "time_lag", "joint_hysteresis"])}
@@ -109,14 +109,14 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
 def test_one_reading_a_level_in_a_single_pull_shows_no_creep() -> None:
     force = np.arange(10) * 20.0
     once = make_bench(bench_data(force, 1e-5 * force))
-    assert once.course.never_held
+    assert once.load_history.never_held
     assert not library(once, ["joint_creep"])
     twice = make_bench(
         bench_data(
             np.repeat(force, 2), 1e-5 * np.repeat(force, 2), step=np.repeat(np.arange(10), 2) + 1
         )
     )
-    assert not twice.course.never_held
+    assert not twice.load_history.never_held
     assert library(twice, ["joint_creep"])
 
 
@@ -211,7 +211,7 @@ def test_products_are_those_of_the_columns() -> None:
 
 def test_zeros_left_out_of_products_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     thin = small_engine(small_bench()).levels[1]
-    monkeypatch.setattr(White, "sparsely", White.between)
+    monkeypatch.setattr(WhitenedColumns, "sparsely", WhitenedColumns.between)
     full = small_engine(small_bench()).levels[1]
     assert thin.log_base == pytest.approx(full.log_base, rel=1e-12)
     assert thin.moment == pytest.approx(full.moment, rel=1e-12)

@@ -34,7 +34,7 @@ JOINT = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0])
 TURN = np.array([0.05, -0.1, 0.14])
 
 
-def standing(tool: Array, joints: Array, turn: Array) -> GapData:
+def with_dwell_means(tool: Array, joints: Array, turn: Array) -> GapData:
     """Pushed where its tool, its joints and its base really are, exact in the levers; the readings
     show where the joints stand."""
     data, arm = arm_data(), load_robot("ur10e")
@@ -72,7 +72,7 @@ def standing(tool: Array, joints: Array, turn: Array) -> GapData:
     ],
 )
 def test_what_is_far_off_is_found_where_it_is(label: str, at: tuple[Array, Array, Array]) -> None:
-    bench = make_bench(standing(*at))
+    bench = make_bench(with_dwell_means(*at))
     base, target = base_columns(bench), bench.observed - prediction(bench)
     engine = Engine(bench, base, target, eta_levels(bench, base, target))
     start = next(v for v in library(bench, ["pose_error"]) if v.label == label)
@@ -87,7 +87,7 @@ def test_what_is_far_off_is_found_where_it_is(label: str, at: tuple[Array, Array
 
 @pytest.mark.slow
 def test_a_tool_far_off_asks_nothing_of_springs_and_gains() -> None:
-    found = explained(standing(TOOL, JOINT * 0, TURN * 0))
+    found = explained(with_dwell_means(TOOL, JOINT * 0, TURN * 0))
     assert found.verdict == "pose_error"
     assert found.after < 1.1 * found.noise
     pulls = found.fit.pulls[: len(found.engine.base.names)]

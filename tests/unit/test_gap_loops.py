@@ -11,9 +11,9 @@ from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
 from identification.gap.effects import library
 from identification.gap.explanations.priors import prior_of
-from identification.gap.laws.flow_back import BACK_FROM
+from identification.gap.laws.bauschinger import BACK_FROM
 from identification.gap.laws.friction_law import parameters
-from identification.gap.laws.interval import Coefficients, Softer
+from identification.gap.laws.interval import Coefficients, ComplianceChange
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import play
 from identification.gap.model.path import Path
@@ -74,18 +74,18 @@ def test_no_loop_is_made_of_a_pull_or_of_one_cycle() -> None:
 def test_metal_that_flows_on_comes_back_as_it_went(knee: float) -> None:
     u, force = flowed(strokes(4, growing=True), knee)
     bench = make_bench(recording(u, force))
-    first, again = bench.course.lost_in_loops
+    first, again = bench.load_history.lost_in_loops
     assert first > 0.2
     assert again < 0.04
-    assert bench.course.comes_back_as_it_went
-    assert not bench.course.rubs
+    assert bench.load_history.comes_back_as_it_went
+    assert not bench.load_history.rubs
 
 
 def test_friction_rubs_every_time() -> None:
     u = strokes(4)
     bench = make_bench(recording(u, rubbed(u) + 25.0))
-    assert bench.course.rubs
-    assert not bench.course.comes_back_as_it_went
+    assert bench.load_history.rubs
+    assert not bench.load_history.comes_back_as_it_went
 
 
 @pytest.mark.parametrize("what", ["both ways", "two runs", "a spring", "seats", "flows and rubs"])
@@ -112,8 +112,8 @@ def test_nothing_is_said_of_other_loads(what: str) -> None:
     else:
         data = recording(u, SPRING * u)
     bench = make_bench(data)
-    assert not bench.course.rubs
-    assert not bench.course.comes_back_as_it_went
+    assert not bench.load_history.rubs
+    assert not bench.load_history.comes_back_as_it_went
 
 
 def test_loops_count_for_friction_and_against_it() -> None:
@@ -275,7 +275,7 @@ def test_what_never_slips_beside_an_imposed_motion_is_a_spring() -> None:
     rubs = 0.3 * np.eye(k)[0]
     shares = []
     for w, stiffer in ((rubs, 0.5), (rubs + 0.5 * np.eye(k)[-1], 0.0)):
-        beside = Softer({joint: stiffer}, {joint: 0.0}, {joint: np.zeros(k)})
+        beside = ComplianceChange({joint: stiffer}, {joint: 0.0}, {joint: np.zeros(k)})
         found = parameters(bench, v, Coefficients(w, 1e-9 * np.eye(k), beside))
         shares.append(found["share_through_friction"].value)
     assert shares[0] == pytest.approx(shares[1])

@@ -11,9 +11,9 @@ from identification.gap.answer.found_notes import readings_missed
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
-from identification.gap.judging import leftover
-from identification.gap.judging.leftover import _still_good
-from identification.gap.judging.remains import readings_left
+from identification.gap.judging import residual_checks
+from identification.gap.judging.residual_checks import _checked_on_arm
+from identification.gap.judging.residuals import excess_joint_reading_rms
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from tests.unit.small_explanations import part, said
@@ -54,18 +54,21 @@ def test_what_a_joint_was_seen_to_do_no_mounting_did(
     q[:, BENT] = turned * turns
     moved = bench.lever[:, BENT] * turned
     target = bench.stacked(moved, q=q)
-    for other in ("strain", "response_left"):  # of the joint's spring, and of the displacement
-        monkeypatch.setattr(leftover, other, lambda *_: 0.0)
+    for other in (
+        "prior_conflict",
+        "excess_response_rms",
+    ):  # of the joint's spring, and of the displacement
+        monkeypatch.setattr(residual_checks, other, lambda *_: 0.0)
     mounting = part("base_slip", [bench.add(bench.stacked(moved))])
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
     slips = said((mounting,), (bench.rows.rms(moved),))
-    off = readings_left(engine, fit(engine, slips))
+    off = excess_joint_reading_rms(engine, fit(engine, slips))
     share = off / bench.rows.rms(moved)  # of which the joint's spring takes what is straight
     assert 0.4 < share < 0.7 if turns else share < 0.02
-    assert _still_good(engine, slips).good is not turns
+    assert _checked_on_arm(engine, slips).adequate is not turns
     no_readings = make_bench(replace(arm_data(), output_encoder=False))
     blind = Engine(no_readings, base_columns(no_readings), no_readings.observed, np.array([0.0]))
-    assert readings_left(blind, fit(blind, NOTHING)) == 0.0
+    assert excess_joint_reading_rms(blind, fit(blind, NOTHING)) == 0.0
 
 
 @pytest.mark.parametrize(("times", "counts"), [(2.0, False), (6.0, True)])
@@ -76,4 +79,4 @@ def test_readings_speak_only_plainly_beyond_their_noise(times: float, counts: bo
     signs = np.random.default_rng(5).choice((-1.0, 1.0), q.stop - q.start)
     target[q] = times * signs * np.hypot(bench.sigma[q], bench.noise.q_run)
     engine = Engine(bench, base_columns(bench), target, np.array([0.0]))
-    assert (readings_left(engine, fit(engine, NOTHING)) > 0) is counts
+    assert (excess_joint_reading_rms(engine, fit(engine, NOTHING)) > 0) is counts

@@ -83,7 +83,7 @@ def test_a_force_that_turns_where_it_turned_before_hardly_drifts(drifts: str) ->
     path = np.sin(np.linspace(0, 2.5, 1600))
     in_force = drifts == "force"
     data = cycling(of_force=5.0 * path) if in_force else cycling(of_laser=5.0 * SPRING * path)
-    assert make_bench(data).course.turns_alike != in_force
+    assert make_bench(data).load_history.turns_alike != in_force
     found = explained(data)
     assert found.verdict == ("force_drift" if in_force else "thermal_drift")
     other = "thermal_drift" if in_force else "force_drift"
@@ -160,7 +160,7 @@ def test_a_table_that_scatters_is_no_curve() -> None:
     off = 3e-5 * np.random.default_rng(12).normal(0, 1, 14)
     data = read_once(np.arange(14) * 1e-4 + off)
     assert np.all(np.diff(data.displacement) > 0)
-    assert not make_bench(data).course.only_a_curve
+    assert not make_bench(data).load_history.only_a_curve
     assert explained(data).verdict == "unknown"
 
 

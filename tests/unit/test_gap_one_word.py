@@ -14,8 +14,8 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import variant
-from identification.gap.search import unseen
-from identification.gap.search.unseen import by_one_word
+from identification.gap.search import overshoots
+from identification.gap.search.overshoots import by_one_word
 from tests.explained import explained
 from tests.slow import slow_ones
 from tests.unit.arm_as_read import as_read, levels_of
@@ -77,8 +77,8 @@ def test_nobody_asks_where_the_hand_was_calm() -> None:
 def test_what_flows_is_asked_in_shorter_tables_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where it flows a path takes ten times as long: nobody waits two minutes for it."""
     rows, at = make_bench(arm_data()).rows, np.arange(20)
-    monkeypatch.setattr(unseen, "_MOST", len(at) * rows.n)
+    monkeypatch.setattr(overshoots, "_MOST", len(at) * rows.n)
     sharp, slow = (variant("joint_yield", "", [0], (1.0,), flow_s=s) for s in (0.0, 5.0))
     each = [Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0) for v in (sharp, slow)]
-    assert [unseen._is_quick(e, at, rows) for e in each] == [True, False]
-    assert unseen._is_quick(each[1], at[:2], rows)
+    assert [overshoots._is_quick(e, at, rows) for e in each] == [True, False]
+    assert overshoots._is_quick(each[1], at[:2], rows)

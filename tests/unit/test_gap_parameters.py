@@ -25,7 +25,7 @@ from identification.gap.evidence.engine import HOLD_PART, ROW_PART, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
-from identification.gap.laws.interval import NOMINAL, Parameter, Softer
+from identification.gap.laws.interval import NOMINAL, ComplianceChange, Parameter
 from identification.gap.laws.lags import late
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
@@ -158,7 +158,7 @@ def test_spread_of_a_slope_is_that_of_its_draws_with_the_threshold_that_goes_wit
     rng = np.random.default_rng(0)
     w = np.where(np.arange(k) < len(radius), 0.5, 0.0)
     root = 0.01 * rng.normal(size=(k, k))
-    softer = Softer({0: 0.2}, {0: 0.0}, {0: np.zeros(k)})
+    softer = ComplianceChange({0: 0.2}, {0: 0.0}, {0: np.zeros(k)})
     found = parameters(bench, Part(knee, 1.0), w, root @ root.T, softer)
     top = 80 - radius
     drawn = (w + rng.normal(size=(20000, k)) @ root.T)[:, : len(radius)]
@@ -193,7 +193,7 @@ def test_change_of_a_compliance_is_over_that_which_was_found(shape: str, grows: 
     rng = np.random.default_rng(0)
     root = 0.02 * rng.normal(size=(len(found),) * 2)
     cov = root @ root.T
-    softer = Softer({0: 0.2}, {0: cov[0, 0]}, {0: cov[0, 1:]})
+    softer = ComplianceChange({0: 0.2}, {0: cov[0, 0]}, {0: cov[0, 1:]})
     p = parameters(bench, Part(v, 1.0), w, cov[1:, 1:], softer)["change_of_compliance_over_range"]
     drawn = found + rng.normal(size=(20000, len(found))) @ root.T
     values = drawn[:, 1:] @ grows / (1 + drawn[:, 0] + line * drawn[:, 1])
@@ -216,7 +216,7 @@ def test_creep_is_what_comes_late_in_the_end_and_in_a_run() -> None:
 def test_what_flows_counts_by_what_it_does_in_one_run() -> None:
     """A dashpot goes on under load, and does not come back without it (Burgers 1935)."""
     bench = make_bench(arm_data())
-    rows, span = bench.rows, bench.course.session_span
+    rows, span = bench.rows, bench.load_history.session_span
     v = of(bench, "joint_creep", "joint 2 spectrum")
     times = np.asarray(v.info["times_s"])
     assert times[-1] == pytest.approx(10 * span)
@@ -244,7 +244,7 @@ def test_creep_is_counted_against_the_spring_as_it_is() -> None:
     rng = np.random.default_rng(1)
     full = np.array([[4e-4, 1e-4, 5e-4], [1e-4, 3e-4, -2e-4], [5e-4, -2e-4, 1e-2]])
     w, joint = np.array([0.15, 0.1]), int(single.info["joint"])
-    softer = Softer({joint: 0.25}, {joint: full[2, 2]}, {joint: full[2, :2]})
+    softer = ComplianceChange({joint: 0.25}, {joint: full[2, 2]}, {joint: full[2, :2]})
     found = parameters(bench, Part(single, 1.0), w, full[:2, :2], softer)["creep_fraction_of_run"]
     after = 1 - np.exp(-52.0 / np.asarray(single.info["times_s"]))
     drawn = np.array([*w, 0.25]) + rng.normal(size=(40000, 3)) @ np.linalg.cholesky(full).T
@@ -394,7 +394,7 @@ def test_friction_with_a_spring_of_its_own_is_counted_against_that_spring() -> N
     root = 0.01 * rng.normal(size=(k + 2, k + 2))
     full = root @ root.T
     w = np.array([*[0.3] * k, 0.5])
-    softer = Softer({joint: 0.1}, {joint: full[-1, -1]}, {joint: full[-1, :-1]})
+    softer = ComplianceChange({joint: 0.1}, {joint: full[-1, -1]}, {joint: full[-1, :-1]})
     found = parameters(bench, Part(rubs, 1.0), w, full[:-1, :-1], softer)
     drawn = np.append(w, 0.1) + rng.normal(size=(40000, k + 2)) @ root.T
     slips = np.asarray(rubs.info["radius"]) < np.ptp(np.append(bench.torque[:, joint], 0.0))
@@ -413,7 +413,7 @@ def test_friction_means_the_same_in_both_conventions(label: str) -> None:
         w = np.zeros(k)
         w[0] = 0.3
         s = -0.3 if on_top else 0.0
-        softer = Softer({joint: s}, {joint: 0.0}, {joint: np.zeros(k)})
+        softer = ComplianceChange({joint: s}, {joint: 0.0}, {joint: np.zeros(k)})
         found.append(parameters(bench, Part(rubs, 1.0), w, np.zeros((k, k)), softer))
     held, slips = found
     for name in ("friction", "share_through_friction"):
@@ -427,7 +427,7 @@ def test_friction_is_over_the_spring_that_was_found() -> None:
     bench = make_bench(arm_data())
     rubs = of(bench, "joint_hysteresis", "joint 1 r 0.2")
     joint, w = int(rubs.info["joint"]), np.full(len(rubs.columns), 0.3)
-    softer = Softer({joint: -0.5}, {joint: 0.0}, {joint: np.zeros(len(w))})
+    softer = ComplianceChange({joint: -0.5}, {joint: 0.0}, {joint: np.zeros(len(w))})
     as_stated, stiffer = (
         parameters(bench, Part(rubs, 1.0), w, no_spread(w), s) for s in (NOMINAL, softer)
     )
@@ -454,7 +454,7 @@ def test_friction_is_not_below_zero() -> None:
     bench = make_bench(bench_data(load, load * 1e-5, step=np.full(300, -1), branch=np.full(300, 3)))
     rubs = of(bench, "joint_hysteresis", "r 0.2")
     k = len(rubs.columns)
-    softer = Softer({}, {}, {})
+    softer = ComplianceChange({}, {}, {})
     for way, below in ((-0.1, True), (0.9, False)):
         read = parameters(bench, Part(rubs, 1.0), np.full(k, way), 0.01 * np.eye(k), softer)
         friction = read["friction"].possible(0.0)

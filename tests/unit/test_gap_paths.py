@@ -10,7 +10,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.answer.result import GapResult
-from identification.gap.judging.paths import goes_as_no_drift, there_and_back
+from identification.gap.judging.paths import is_implausible_drift, there_and_back
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import DESIGNS, imported, meta, noisy
 from tests.explained import explained
@@ -64,9 +64,9 @@ def test_heat_does_not_come_and_leave_within_minutes(
     )
     fitted = SimpleNamespace(parts=(part,), of=lambda _: (way, None))
     rows = SimpleNamespace(clock=clock, n=1)
-    bench = SimpleNamespace(rows=rows, course=SimpleNamespace(session_span=1600.0))
+    bench = SimpleNamespace(rows=rows, load_history=SimpleNamespace(session_span=1600.0))
     engine = SimpleNamespace(bench=bench, columns=lambda _: shown)
-    assert goes_as_no_drift(engine, fitted) is no_drift
+    assert is_implausible_drift(engine, fitted) is no_drift
 
 
 def hump(width_s: float) -> GapResult:

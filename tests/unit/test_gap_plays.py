@@ -177,7 +177,7 @@ def test_a_play_within_a_load_from_one_side_is_seldom_and_sharp(runs_on: bool) -
         data = replace(running(load, load / SPRING, imposed="force"), **changes)
         bench = make_bench(data)
         assert bench.rows.continuous is runs_on
-        assert bench.course.one_sided is not both
+        assert bench.load_history.one_sided is not both
         plays = [v for v in library(bench, ["joint_backlash"]) if v.info["preload_Nm"]]
         closer = joint_backlash.refined(bench, plays[len(plays) // 2])  # both flanks seen
         beside = {"free", "soft", "slow"}  # no "sprung": straight and soft there is a curve

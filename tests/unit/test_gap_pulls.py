@@ -18,10 +18,10 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, energies
 from identification.gap.explanations.penalties import _same_element
 from identification.gap.explanations.priors import prior_of
-from identification.gap.explanations.verdict import BENCH_DOUBT, trusted
+from identification.gap.explanations.verdict import BENCH_DOUBT, discounted
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import make_bench
-from identification.gap.search.strange import strangers
+from identification.gap.search.unmodelled_shapes import unmodelled_variants
 from identification.gap.words import WORDS
 from rig.diagnosis.diagnose_text import meanings, render
 from tests.explained import explained
@@ -188,8 +188,8 @@ def test_pulls_that_start_from_zero_again_show_that_a_curve_comes_back() -> None
     n = len(x)
     run = np.repeat([0, 1], n)
     found = pulled(np.tile(force, 2), np.tile(x * STROKE, 2), run=run, repetition=run + 1)
-    assert found.bench.course.repeats
-    assert not found.bench.course.unloads
+    assert found.bench.load_history.repeats
+    assert not found.bench.load_history.unloads
     assert found.verdict == "joint_nonlinear_stiffness"
     assert found.fit.parts[0].variant.label == "joint 1 fine curve"
 
@@ -201,7 +201,7 @@ def test_a_dent_that_stays_yields_from_the_first_load_on(left: float, under_a_ti
     most = np.maximum.accumulate(x)
     depth = STROKE * (left * most**0.5 + (1 - left) * x**0.7)
     data = running(100 * x, depth, imposed="force", instruments=METER)
-    assert make_bench(data).course.left_behind == pytest.approx(left, abs=0.02)
+    assert make_bench(data).load_history.left_behind == pytest.approx(left, abs=0.02)
     labels = [v.label for v in library(make_bench(data), ["joint_yield"])]
     assert ("joint 1 hardened beyond 0.01" in labels) is under_a_tip
     if under_a_tip:
@@ -223,7 +223,7 @@ def test_cracks_under_an_imposed_stroke_are_no_drift_of_it() -> None:
 def test_nobody_is_surer_of_the_unknown_than_of_a_word() -> None:
     doubted = {"joint_yield", "none", "unknown"}
     for word in doubted:
-        sure = trusted({w: float(w == word) for w in doubted}, doubted, BENCH_DOUBT)
+        sure = discounted({w: float(w == word) for w in doubted}, doubted, BENCH_DOUBT)
         assert sum(sure.values()) == pytest.approx(1.0)
         assert sure[word] < 1 - 0.6 * BENCH_DOUBT
 
@@ -245,7 +245,7 @@ def test_a_way_at_no_force_before_a_contact_is_taken_up_slack() -> None:
     u, force = approached()
     found = pulled(force, u, imposed=None)
     assert found.bench.imposed
-    assert found.bench.course.approaches
+    assert found.bench.load_history.approaches
     assert found.verdict == "contact_seating"
     assert found.probabilities["contact_seating"] > 0.6
     (depth,) = (p for n, p in found.effects[0].parameters.items() if n == "depth")
@@ -278,7 +278,9 @@ def test_a_way_at_some_force_or_a_slow_one_is_no_approach(what: str) -> None:
         u, force = (np.concatenate([v, v[::-1]]) for v in (u, force))
     else:
         force = 100.0 * (u / u[-1]) ** 2
-    assert not make_bench(running(force, u, instruments=METER, imposed=driven)).course.approaches
+    assert not make_bench(
+        running(force, u, instruments=METER, imposed=driven)
+    ).load_history.approaches
 
 
 @pytest.mark.parametrize("power", [1, 6])
@@ -287,7 +289,7 @@ def test_a_driven_approach_need_not_be_fast_but_nothing_may_be_felt_on_it(power:
     if power > 1:  # stiffens so late that half of the way looks like no force at a glance
         force = 1500.0 * (u / u[-1]) ** power
     bench = make_bench(running(force, u, instruments=METER, imposed="displacement"))
-    assert bench.course.approaches == (power == 1)
+    assert bench.load_history.approaches == (power == 1)
 
 
 def test_what_is_met_after_an_approach_may_seat_itself() -> None:
@@ -323,11 +325,11 @@ def test_an_arm_is_asked_nothing_of_all_that() -> None:
         make_bench(running(f, x, instruments=METER, imposed="displacement"))
         for f, x in ((force, u), (flat, np.linspace(0.0, STROKE, 160)))
     ]
-    assert of_pulls[0].course.approaches
-    assert of_pulls[1].course.flows_out
+    assert of_pulls[0].load_history.approaches
+    assert of_pulls[1].load_history.flows_out
     near, flows = (replace(b, data=replace(b.data, arm=True)) for b in of_pulls)
-    assert not near.course.approaches
-    assert not flows.course.flows_out
+    assert not near.load_history.approaches
+    assert not flows.load_history.flows_out
 
 
 def pulled_and_pressed(again: bool = False) -> GapData:
@@ -353,15 +355,17 @@ def test_pull_and_press_may_each_have_a_curve_of_its_own() -> None:
     found = explained(pulled_and_pressed())
     assert found.verdict == "joint_nonlinear_stiffness"
     assert "uneven" in found.effects[0].label
-    assert not found.bench.course.comes_again  # no load was met twice: that no stiffness wanders
+    assert (
+        not found.bench.load_history.comes_again
+    )  # no load was met twice: that no stiffness wanders
     for data, told in ((pulled_and_pressed(), False), (pulled_and_pressed(again=True), True)):
         bench = make_bench(data)
-        assert bench.course.comes_again == told
-        found_there = strangers(bench, base_columns(bench), bench.observed)
+        assert bench.load_history.comes_again == told
+        found_there = unmodelled_variants(bench, base_columns(bench), bench.observed)
         assert any(v.word == "slopes" for v in found_there) == told
     data = pulled_and_pressed(again=True)  # along two directions, once each
     bench = make_bench(replace(data, setups=data.setups * 2, setup=data.run))
-    assert not bench.course.comes_again
+    assert not bench.load_history.comes_again
 
 
 @pytest.mark.parametrize("off", [0.0, 0.04])
@@ -370,7 +374,7 @@ def test_what_is_at_its_zero_without_load_has_not_slipped_on_its_way_there(off: 
     with its zero elsewhere may as well be half a loop."""
     stretch = np.linspace(0.55, 1.9, 34)
     found = pulled(12.0 * (stretch - stretch**-2), (stretch - 1 + off) * STROKE)
-    assert found.bench.course.crosses_its_zero == (off == 0)
+    assert found.bench.load_history.crosses_its_zero == (off == 0)
     assert (found.verdict == "joint_nonlinear_stiffness") == (off == 0)
 
 

@@ -13,7 +13,7 @@ from identification.gap.answer.designs import _levels
 from identification.gap.data import GapData
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.holds import hold_ids, is_continuous, rest_ids, scatter_within
-from identification.gap.recording.ramps import _leading_on, ramps_told
+from identification.gap.recording.ramps import _leading_on, with_ramps_marked
 from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -44,13 +44,13 @@ def recorded(path: object = straight, sd_N: float = 0.05) -> tuple[GapData, Arra
 @pytest.mark.parametrize("path", [straight, eased])
 def test_a_ramp_before_a_level_is_no_part_of_its_hold(path: object) -> None:
     data, level = recorded(path)
-    told = ramps_told(data)
+    told = with_ramps_marked(data)
     rows = reduce_rows(told)
     off = rows.force - level[np.searchsorted(data.time, rows.time)]
-    assert np.abs(off[~rows.on_the_way]).max() < 0.3
-    assert np.abs(off[rows.on_the_way]).max() > 5
-    np.testing.assert_array_equal(rows.force[rows.on_the_way], rows.measured_force[rows.on_the_way])
-    assert np.sum(rows.steady & ~rows.on_the_way) > 20
+    assert np.abs(off[~rows.in_ramp]).max() < 0.3
+    assert np.abs(off[rows.in_ramp]).max() > 5
+    np.testing.assert_array_equal(rows.force[rows.in_ramp], rows.measured_force[rows.in_ramp])
+    assert np.sum(rows.steady & ~rows.in_ramp) > 20
     # nor of its noise, nor a vibration
     rests = rest_ids(told, hold_ids(told))
     assert scatter_within(told.force, rests) == pytest.approx(0.05, rel=0.25)
@@ -79,7 +79,7 @@ def test_what_goes_on_while_the_load_stands_is_no_way(what: str) -> None:
     moved += noise * rng.normal(0, 1e-6, n)
     data = bench_data(force, moved, step=(level / 10).astype(int))
     data = replace(data, instruments=replace(data.instruments, force=0.05))
-    assert ramps_told(data) is data
+    assert with_ramps_marked(data) is data
 
 
 def test_levels_to_both_sides_are_levels_whatever_leads_to_them() -> None:
@@ -90,9 +90,9 @@ def test_levels_to_both_sides_are_levels_whatever_leads_to_them() -> None:
     branch = np.where(step > 0, 1, 0)
     data = bench_data(force, SPRING * force, step=step, branch=branch)
     assert not is_continuous(data, hold_ids(data))
-    told = ramps_told(data)
-    assert told.on_the_way is not None
-    assert np.flatnonzero(told.on_the_way).tolist() == [48, 108]  # still loaded, at no load
+    told = with_ramps_marked(data)
+    assert told.in_ramp is not None
+    assert np.flatnonzero(told.in_ramp).tolist() == [48, 108]  # still loaded, at no load
     assert not reduce_rows(told).continuous
 
 
@@ -102,10 +102,10 @@ def test_of_what_runs_only_the_way_to_no_load_is_told() -> None:
     )
     branch = np.repeat([0, 1, 0], [20, 60, 60])
     data = bench_data(force, SPRING * force, step=np.full(140, -1), branch=branch)
-    told = ramps_told(data)
-    assert told.on_the_way is not None
-    assert np.all(told.branch[told.on_the_way] == 0)
-    assert 30 <= told.on_the_way.sum() <= 41
+    told = with_ramps_marked(data)
+    assert told.in_ramp is not None
+    assert np.all(told.branch[told.in_ramp] == 0)
+    assert 30 <= told.in_ramp.sum() <= 41
 
 
 def test_levels_are_levels_though_a_lag_hides_the_way_there() -> None:
@@ -164,11 +164,11 @@ def named_late(hardens: bool = False) -> tuple[GapData, Array, Array]:
 def test_a_ramp_named_after_the_level_it_leaves_belongs_to_the_next(hardens: bool) -> None:
     data, leads_to, at_rest = named_late(hardens)
     assert is_continuous(data, hold_ids(data))  # half of every way is in its hold
-    told = ramps_told(data)
+    told = with_ramps_marked(data)
     assert not is_continuous(told, hold_ids(told))
     rows = reduce_rows(told)
     assert not rows.continuous
-    still = ~rows.on_the_way & (rows.weight > 1)
+    still = ~rows.in_ramp & (rows.weight > 1)
     where = np.searchsorted(data.time, rows.time[still])
     assert np.abs(rows.force[still] - leads_to[where]).max() < 2.0
     assert np.sum(told.ways & at_rest) <= 1

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.gap.search import refine as room
-from identification.gap.search.unseen import Unseen, _unlike, _worth
+from identification.gap.search.overshoots import Overshoots, _unlike, _worth
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ NOWHERE = np.zeros(1)
 
 
 def test_loads_before_most_levels_or_for_little_are_no_hand() -> None:
-    few, most = (Unseen(frozenset(), NOWHERE, count, 40) for count in (5, 25))
+    few, most = (Overshoots(frozenset(), NOWHERE, count, 40) for count in (5, 25))
     assert _worth(few, few.cost, 0.7)
     assert not _worth(few, 0.5 * few.cost, 0.7)
     assert not _worth(most, 10 * most.cost, 0.7)

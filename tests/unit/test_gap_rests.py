@@ -18,7 +18,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import variant
 from identification.gap.recording.glitches import picked
-from identification.gap.search.strange import strangers
+from identification.gap.search.unmodelled_shapes import unmodelled_variants
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
@@ -53,7 +53,7 @@ def test_what_is_stated_of_a_bench_is_known_to_a_factor_of_two() -> None:
 def test_many_readings_of_a_level_tell_the_time_without_a_clock(repeats: int, told: bool) -> None:
     data = levels(0.5, repeats)
     bench = make_bench(GapData(**{**vars(data), "timed": False}))
-    assert bench.course.timeless is not told
+    assert bench.load_history.timeless is not told
     assert bool(library(bench, ["joint_creep"])) is told
 
 
@@ -69,7 +69,7 @@ def test_pulls_that_never_come_back_hide_all_memory(back: bool, hidden: bool) ->
     base, target = base_columns(bench), bench.observed - prediction(bench)
     engine = Engine(bench, base, target, eta_levels(bench, base, target))
     words = {v.word: Part(v, v.scales[0]) for v in variants}
-    assert not bench.course.once
+    assert not bench.load_history.monotonic
     assert _same_element(engine, *words.values()) is hidden
 
 
@@ -93,7 +93,7 @@ def test_levels_that_make_a_smooth_curve_are_a_spring(off: float, rough: bool) -
     def found(data: GapData) -> bool:
         bench = make_bench(data)
         target = bench.observed - prediction(bench)
-        return "rough" in {v.word for v in strangers(bench, base_columns(bench), target)}
+        return "rough" in {v.word for v in unmodelled_variants(bench, base_columns(bench), target)}
 
     assert found(data) is rough
     assert found(few)

@@ -86,7 +86,7 @@ def test_what_is_late_is_behind_at_the_end_and_as_likely_as_what_is_not() -> Non
     last = max(late, key=lambda v: v.info["lags_s"][0])
     w = np.array([1e-5, 0.0])
     told = parameters(bench, Part(last, 1.0), w, np.zeros((2, 2)))["drift_over_session_x"]
-    behind = last.info["lags_s"][0] / bench.course.session_span
+    behind = last.info["lags_s"][0] / bench.load_history.session_span
     assert told.value == pytest.approx(1e-2 * (1 - behind * (1 - np.exp(-1 / behind))), rel=1e-3)
 
 

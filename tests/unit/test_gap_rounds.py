@@ -37,14 +37,18 @@ class Rounds:
         self.searched: list[set[str]] = []  # words that were left out
         self._loads = SimpleNamespace(words=frozenset({WORD}), cost=cost)
         self._results, self._last, self._whole = iter(found), None, whole
-        monkeypatch.setattr(diagnose, "foretells", lambda one: one.foretells)
+        monkeypatch.setattr(diagnose, "predicts_held_out", lambda one: one.foretells)
         monkeypatch.setattr(diagnose, "first_repetitions", lambda engine: FIRST)
         monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(()))
-        monkeypatch.setattr(diagnose, "unseen", lambda one, told_by: self._ask(told_by))
+        monkeypatch.setattr(
+            diagnose,
+            "overshoots_of_best",
+            lambda one, calibration_rows: self._ask(calibration_rows),
+        )
         monkeypatch.setattr(diagnose, "_along", lambda *args: self._search(set(args[-1])))
 
-    def _ask(self, told_by: str | None) -> Any:
-        self.asked.append(told_by)
+    def _ask(self, calibration_rows: str | None) -> Any:
+        self.asked.append(calibration_rows)
         return self._loads
 
     def _search(self, withheld: set[str]) -> Any:
@@ -142,7 +146,7 @@ def test_what_acts_only_where_a_hand_went_is_no_law(monkeypatch: pytest.MonkeyPa
     Rounds(monkeypatch, better)
     assert diagnose._with_unseen(start := result(0.0, True), (), ()) is better
     Rounds(monkeypatch, better)
-    monkeypatch.setattr(diagnose, "acts_by_hands_alone", lambda one: one is better)
+    monkeypatch.setattr(diagnose, "acts_only_after_overshoot", lambda one: one is better)
     assert diagnose._with_unseen(start, (), ()) is start
 
 
@@ -161,7 +165,7 @@ def test_a_word_alone_asks_first_where_it_then_explains_more_than_all_did(
     along = dict(zip(words, [result(value, True) for value in by_each], strict=True))
     Rounds(monkeypatch)
     monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(loads))
-    monkeypatch.setattr(diagnose, "unseen", lambda *_: None)
+    monkeypatch.setattr(diagnose, "overshoots_of_best", lambda *_: None)
     asked = []
 
     def searched(_: Any, more: Any, known: Any, withheld: set[str]) -> Any:
@@ -182,6 +186,6 @@ def test_a_word_alone_that_all_others_do_not_bear_out_is_dropped(
     start = result(0.0, True)
     Rounds(monkeypatch)
     monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter((loads,)))
-    monkeypatch.setattr(diagnose, "unseen", lambda *_: None)
+    monkeypatch.setattr(diagnose, "overshoots_of_best", lambda *_: None)
     monkeypatch.setattr(diagnose, "_along", lambda *given: result(20.0 if given[-1] else 9.0, True))
     assert diagnose._with_unseen(start, (), ()) is start

@@ -15,9 +15,9 @@ from identification.gap.data import GapData, Instruments
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.priors import prior_of
-from identification.gap.judging.leftover import _FALL
+from identification.gap.judging.residual_checks import _FALL
 from identification.gap.laws.drift import free_paths, shares
-from identification.gap.laws.hardened import grown
+from identification.gap.laws.isotropic_hardening import grown
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.rows import reduce_rows
@@ -57,7 +57,7 @@ def test_one_running_pass_or_cycle_shows_no_drift(word: str) -> None:
     for cycles in (0.5, 1.0):
         force = 100 * triangle(400, cycles)
         bench = make_bench(running(force, force / SPRING, imposed="force"))
-        assert bench.course.passes < 3
+        assert bench.load_history.passes < 3
         assert words_with(bench, word) == []
 
 
@@ -75,7 +75,7 @@ def test_cycles_and_an_unloaded_rig_show_drifts_of_any_path(word: str) -> None:
     assert "free path" in words_with(make_bench(running(force, force / SPRING)), word)
     still, moving = rng.normal(0, 0.1, 900), np.cumsum(rng.normal(0, 1e-7, 900))
     rest = make_bench(running(still, moving, imposed="force"))
-    assert rest.course.stands
+    assert rest.load_history.stands
     assert "free path" in words_with(rest, word)
     assert {w.pieces for w in free_paths(rest).values()} == {20}  # a quicker one could be anything
     assert max(shares(rest, (0.1, 0.3))) == 3.0
@@ -99,8 +99,8 @@ def test_under_a_load_that_stands_creep_may_be_as_slow_and_large_as_was_seen(jit
     force[[100, 120]] += 5 * jitter  # a jerk of the machine is no motion of the load
     flowing = 0.05 * t / 300 + 0.01 * (1 - np.exp(-t / 20)) + rng.normal(0, 1e-6, 300)
     bench = make_bench(data := running(force, flowing, imposed="force"))
-    assert bench.course.stands
-    assert not bench.course.always_moves
+    assert bench.load_history.stands
+    assert not bench.load_history.always_moves
     creep = library(bench, ["joint_creep"])
     assert max(v.info["times_s"].max() for v in creep) > 300
     assert max(v.scales[-1] for v in creep) > 0.06 / (100 / SPRING)
@@ -170,7 +170,7 @@ def test_one_reading_that_jumps_is_no_fall_of_the_force() -> None:
         force = 40 * (u / 1e-3) ** 3 + 20 * u / 1e-3
         force[30 : 30 + many] += 20.0
         bench = make_bench(running(force, u, imposed="displacement"))
-        assert (bench.course.fall > _FALL) == falls
+        assert (bench.load_history.fall > _FALL) == falls
 
 
 @pytest.mark.slow
@@ -226,8 +226,8 @@ def test_one_factor_is_shared_as_calibrations_are_stated() -> None:
 def test_one_pull_that_never_stood_shows_neither_creep_nor_exponential_friction() -> None:
     force = 100 * triangle(400, 0.5)
     bench = make_bench(running(force, force / SPRING, imposed="force"))
-    assert bench.course.once
-    assert bench.course.always_moves
+    assert bench.load_history.monotonic
+    assert bench.load_history.always_moves
     assert words_with(bench, "joint_creep") == []
     assert not any("Dahl" in w or "worked in" in w for w in words_with(bench, "joint_hysteresis"))
     cycled = make_bench(running(100 * triangle(400, 2), 1e-3 * triangle(400, 2), imposed="force"))
@@ -347,7 +347,7 @@ def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -
         imposed="force",
     )
     bench = make_bench(data)
-    assert bench.course.one_rate is one
+    assert bench.load_history.one_rate is one
     # there, creep in proportion to anything would be a loop of any shape
     assert any(v.info["bent"] for v in library(bench, ["joint_creep"])) is not one
     slow = prior_of(frozenset(["joint_creep"]), bench)
@@ -358,7 +358,7 @@ def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -
 
 def test_what_was_held_goes_at_no_rate() -> None:
     force = 100 * np.minimum(np.arange(400) / 100, 1.0)
-    assert not make_bench(running(force, force / SPRING, imposed="force")).course.one_rate
+    assert not make_bench(running(force, force / SPRING, imposed="force")).load_history.one_rate
 
 
 def test_a_stroke_that_hardly_comes_back_has_come_back() -> None:
@@ -375,21 +375,21 @@ def test_a_stroke_that_hardly_comes_back_has_come_back() -> None:
     meter = Instruments(0.1, 1e-7, 0.005, 0.003)
     assert not make_bench(
         running(force, depth, imposed="displacement", instruments=meter)
-    ).course.once
+    ).load_history.monotonic
     slipped = np.linspace(0, 1e-3, 230)  # the force falls, the stroke goes on
     assert make_bench(
         running(force, slipped, imposed="displacement", instruments=meter)
-    ).course.once
+    ).load_history.monotonic
 
 
 def test_a_load_that_wavers_without_any_bearing_stands() -> None:
     rng = np.random.default_rng(10)
     force = rng.normal(0, 0.5, 400)  # five times what is stated
     drifting = make_bench(running(force, np.linspace(0, 1e-3, 400), imposed="force"))
-    assert drifting.course.stands
+    assert drifting.load_history.stands
     assert "free path" in words_with(drifting, "thermal_drift")
     spring = make_bench(running(force, force / SPRING, imposed="force"))
-    assert not spring.course.stands
+    assert not spring.load_history.stands
 
 
 def test_a_cell_at_rest_says_nothing_of_any_stiffness() -> None:
@@ -397,7 +397,7 @@ def test_a_cell_at_rest_says_nothing_of_any_stiffness() -> None:
     rng = np.random.default_rng(11)
     force = np.round(rng.normal(0, 0.1, 250), 2)
     bench = make_bench(running(force, np.zeros(250), imposed="force"))
-    assert bench.course.stands
+    assert bench.load_history.stands
     assert {v.word for v in library(bench)} <= set(STANDING)
     found = explained(running(force, np.zeros(250), imposed="force"))
     assert found.verdict in ("none", "force_drift")
@@ -414,7 +414,7 @@ def test_several_rates_at_once_are_as_free_as_a_path_of_pieces(cycles: float, ma
 def test_strokes_that_grow_in_the_same_time_go_at_one_rate() -> None:
     t = np.arange(600) / 600
     force = 100 * (0.1 + t) * np.sin(2 * np.pi * 5 * t)
-    assert make_bench(running(force, force / SPRING, imposed="force")).course.one_rate
+    assert make_bench(running(force, force / SPRING, imposed="force")).load_history.one_rate
 
 
 def test_a_melt_that_flows_on_creeps_however_far() -> None:
@@ -446,9 +446,9 @@ def test_a_melt_that_flows_on_creeps_however_far() -> None:
 def test_turning_points_of_a_crank_are_no_holds() -> None:
     for cycles in (2, 3, 5, 8):
         force = 100 * np.sin(2 * np.pi * cycles * np.arange(900) / 900)
-        assert make_bench(running(force, force / SPRING, imposed="force")).course.always_moves, (
-            cycles
-        )
+        assert make_bench(
+            running(force, force / SPRING, imposed="force")
+        ).load_history.always_moves, cycles
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -470,10 +470,10 @@ def test_a_hold_of_which_only_the_ends_were_kept_is_one_and_a_pause_is_none(runs
     run = (t > 100) * (runs - 1)
     data = running(force, force / SPRING, imposed="force", run=run, repetition=run + 1)
     bench = make_bench(replace(data, time=t, session=t))
-    assert bench.course.always_moves is (runs == 2)
+    assert bench.load_history.always_moves is (runs == 2)
     assert words_with(bench, "joint_creep")
     later = make_bench(replace(data, time=t, session=t, run=(t > 5).astype(np.int64)))
-    assert not later.course.always_moves  # the run that was held began within the first piece
+    assert not later.load_history.always_moves  # the run that was held began within the first piece
 
 
 @pytest.mark.parametrize(("imposed", "holds"), [(None, False), ("force", True)])
@@ -484,9 +484,9 @@ def test_a_stroke_that_runs_on_while_the_force_stands_is_no_hold(
     t = np.arange(120.0)
     force = 50 * np.minimum(t / 80, 1.0)
     u = force / SPRING + 4e-5 * np.maximum(t - 80, 0.0)
-    assert make_bench(running(force, u, imposed=imposed)).course.always_moves != holds
+    assert make_bench(running(force, u, imposed=imposed)).load_history.always_moves != holds
     slow = np.where(t > 80, 1e-4 * (1 - np.exp(-(t - 80) / 20)), 0.0)  # creep slows down
-    assert not make_bench(running(force, 10 * force / SPRING + slow)).course.always_moves
+    assert not make_bench(running(force, 10 * force / SPRING + slow)).load_history.always_moves
 
 
 @pytest.mark.parametrize(
@@ -511,13 +511,13 @@ def test_before_the_load_comes_nothing_is_held(load: str, holds: bool) -> None:
         "at once, and gone": 50 * np.clip(1 - t / 60, 0, 1) + 0.1,
     }[load]
     bench = make_bench(running(force, force / SPRING, imposed="force"))
-    assert bench.course.always_moves != holds
+    assert bench.load_history.always_moves != holds
     assert bool(words_with(bench, "joint_creep")) == holds
 
 
 def test_waiting_before_loops_is_a_stand_and_takes_no_time_of_them() -> None:
     force = np.append(np.zeros(600), 50 * triangle(300, 6))
-    course = make_bench(running(force, force / SPRING, imposed="force")).course
+    course = make_bench(running(force, force / SPRING, imposed="force")).load_history
     assert not course.always_moves
     assert course.stroke_s == pytest.approx(25, rel=0.15)
 
@@ -527,7 +527,7 @@ def test_a_specimen_that_relaxes_before_its_stroke_is_held() -> None:
     stroke = 1e-3 * np.clip((t - 80) / 160, 0, 1)
     force = 40 * np.exp(-np.minimum(t, 80) / 30) + stroke * SPRING
     data = running(force, stroke, imposed="displacement")
-    assert not make_bench(data).course.always_moves
+    assert not make_bench(data).load_history.always_moves
 
 
 def test_a_long_table_of_numbered_readings_runs() -> None:

@@ -11,7 +11,7 @@ import pytest
 from identification.arrays import Array
 from identification.gap.data import LOADING, UNLOADING, ZERO, GapData
 from identification.gap.recording.holds import hold_ids, is_continuous
-from identification.gap.recording.ramps import ramps_told, steps_numbered
+from identification.gap.recording.ramps import steps_numbered, with_ramps_marked
 from tests.unit.test_gap_operators import bench_data
 
 SPRING, SD = 1e-5, 0.1  # m/N; N of one sample
@@ -45,7 +45,7 @@ def test_the_way_between_two_levels_bears_the_name_of_the_one_it_leads_to() -> N
     np.testing.assert_array_equal(data.step, data.step[after])
     late = replace(stairs(force), branch=np.where(way, UNLOADING, LOADING))
     assert not np.any(steps_numbered(late).branch == UNLOADING)
-    assert np.mean(ramps_told(data).ways[way]) > 0.7  # the shortest drown in noise
+    assert np.mean(with_ramps_marked(data).ways[way]) > 0.7  # the shortest drown in noise
 
 
 def test_a_displacement_that_is_set_makes_levels_on_which_the_force_relaxes() -> None:

@@ -10,7 +10,7 @@ import pytest
 from identification.arrays import Array
 from identification.gap.data import Instruments
 from identification.gap.model.bench import make_bench
-from identification.gap.model.driven import driven, standing
+from identification.gap.model.driven import driven, with_dwell_means
 from identification.gap.model.history import sampling_time
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.recording.white import white_noise
@@ -122,7 +122,7 @@ def test_what_is_driven_stands_where_it_stands_and_moves_where_it_moves() -> Non
     path = np.concatenate([np.linspace(0, 1, 60), np.ones(80), np.linspace(1, 0, 60)])
     noisy = path + rng.normal(0, 1e-3, 200)
     rows = reduce_rows(running(noisy, noisy))
-    out = standing(rows, noisy, 1e-3)
+    out = with_dwell_means(rows, noisy, 1e-3)
     held = slice(65, 135)
     assert np.ptp(out[held]) < 0.2 * np.ptp(noisy[held])
     assert out[held].mean() == pytest.approx(1.0, abs=1e-3)
@@ -135,11 +135,11 @@ def test_a_path_that_goes_slowly_against_its_noise_is_read_from_its_means() -> N
     path = np.linspace(0, 0.05, 200)  # a quarter of the noise a row
     noisy = path + rng.normal(0, 1e-3, 200)
     rows = reduce_rows(running(noisy, noisy))
-    out = standing(rows, noisy, 1e-3)
+    out = with_dwell_means(rows, noisy, 1e-3)
     assert np.std(out - path) < 0.5e-3
     assert np.diff(out)[10:-10].min() > -0.6e-3  # no steps, and no way back as in the readings
     jump = np.where(path > 0.025, path + 0.1, path) + (noisy - path)
-    assert np.mean(standing(rows, jump, 1e-3) != jump) < 0.2  # which means would smear
+    assert np.mean(with_dwell_means(rows, jump, 1e-3) != jump) < 0.2  # which means would smear
 
 
 def test_where_a_straight_path_turns_its_means_stay_within_its_legs() -> None:
@@ -147,7 +147,7 @@ def test_where_a_straight_path_turns_its_means_stay_within_its_legs() -> None:
     path = 1e-3 * triangle(400, 6)
     noise = np.random.default_rng(8).normal(0, 2e-5, 400)
     rows = reduce_rows(running(SPRING * path, path + noise))
-    off = standing(rows, rows.displacement, 2e-5) - path
+    off = with_dwell_means(rows, rows.displacement, 2e-5) - path
     assert np.std(off) < 0.7 * np.std(noise)  # they are means
     tips = path > 0.97e-3
     assert tips.sum() > 10
@@ -160,9 +160,9 @@ def test_what_goes_straight_on_is_read_from_its_means_however_fast() -> None:
     n, noise = 240, 1e-3 * rng.normal(0, 1, 240)
     pull = np.linspace(0, 0.7, n)  # three times the noise a row
     rows = reduce_rows(running(pull, pull))
-    assert np.std(standing(rows, pull + noise, 1e-3) - pull) < 0.5e-3
+    assert np.std(with_dwell_means(rows, pull + noise, 1e-3) - pull) < 0.5e-3
     turns = np.minimum(pull, 0.7 - pull)
-    assert np.array_equal(standing(rows, turns + noise, 1e-3), turns + noise)
+    assert np.array_equal(with_dwell_means(rows, turns + noise, 1e-3), turns + noise)
 
 
 def test_steps_of_a_coarse_reading_are_its_noise() -> None:
@@ -271,7 +271,7 @@ def test_a_creep_rack_is_driven_by_its_weight_and_creeps() -> None:
     moved = np.where(late > 0, 20.0 / SPRING * (1 + 0.1 * np.maximum(late, 0.1) ** 0.3), 0.0)
     data = running(force, moved + rng.normal(0, 2e-7, 162), instruments=METER)
     bench = make_bench(data)
-    assert not bench.course.approaches
+    assert not bench.load_history.approaches
     assert not bench.imposed
     found = explained(data)
     assert found.verdict == "joint_creep"
@@ -282,4 +282,4 @@ def test_steps_that_what_is_stated_has_no_room_for_are_steps() -> None:
     """Levels that were set, not read: each stands as it was set."""
     force = np.repeat(np.arange(0.0, 100.0, 5.0), 12)
     rows = reduce_rows(running(force, force / SPRING, imposed="force"))
-    assert np.array_equal(standing(rows, force, 0.5), force)
+    assert np.array_equal(with_dwell_means(rows, force, 0.5), force)

@@ -161,7 +161,7 @@ def test_springs_lead_where_they_do_far_more_than_all_the_rest(
     result = SearchResult(engine, ranked, {}, {}, -np.inf, 0.0, variants=tuple(shapes))
     found, led = off_from_stated(engine, curve), led_by_springs(result, ranked)
     assert (found is not None) == off
-    assert led.speakers == ({curve.words: spring_alone} if off else {})
+    assert led.representatives == ({curve.words: spring_alone} if off else {})
     pair = next(e for e in led.explanations if e.words == both.words)
     assert pair.parts[0].word == (SPRINGS if off else CURVE)
     assert {e.words for e in led.explanations} == {e.words for e in ranked}
@@ -243,7 +243,13 @@ def test_who_speaks_for_fewer_effects_speaks_for_more_that_bring_no_more() -> No
     spring = said((part(SPRINGS, [line]),), (1e-4,), -50.0)
     none = said((), (), -log(1e30))
     found = SearchResult(
-        engine, (three, two, spring, none), {}, {}, -np.inf, 0.0, speakers={two.words: spring}
+        engine,
+        (three, two, spring, none),
+        {},
+        {},
+        -np.inf,
+        0.0,
+        representatives={two.words: spring},
     )
     likeliest = max((p := with_posterior(found, {}).probabilities), key=lambda w: p[w])
     assert likeliest == SPRINGS

@@ -12,7 +12,7 @@ from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, _beyond_scatter, part_sizes
-from identification.gap.judging.strain import JUMP, _jumps
+from identification.gap.judging.prior_conflict import JUMP, _jumps
 from identification.gap.laws.drift import FreePath
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import displacement_imposed, make_bench

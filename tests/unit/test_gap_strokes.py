@@ -41,9 +41,9 @@ def test_friction_whose_first_slope_was_simulated_is_friction() -> None:
 def test_a_lag_is_no_longer_than_half_a_stroke() -> None:
     u = 1e-3 * np.minimum(np.arange(300) / 10, 1.0)
     bench = make_bench(running(SPRING * u, u, imposed="displacement"))
-    assert 5 < bench.course.stroke_s < 25
+    assert 5 < bench.load_history.stroke_s < 25
     longest = max(v.info["lag_s"] for v in library(bench, ["time_lag"]))
-    assert longest <= bench.course.stroke_s / 2
+    assert longest <= bench.load_history.stroke_s / 2
 
 
 def test_a_driven_channel_that_lags_was_ahead_only_while_it_moved() -> None:

@@ -25,12 +25,12 @@ from identification.gap.explanations.verdict import (
     _heir,
     _main,
     _tells_of_three,
-    may_miss,
-    speaker_of,
+    find_representative,
+    tolerated_misfit,
     with_a_lead,
     with_posterior,
 )
-from identification.gap.judging.leftover import looked_up
+from identification.gap.judging.residual_checks import reweighted_by_residuals
 from identification.gap.search.search import search
 from identification.gap.words import JERKS
 from tests.unit.small_explanations import OFF, part, replace_bench, said, small_engine_of
@@ -72,7 +72,7 @@ def test_an_heir_speaks_as_if_it_had_been_found_first() -> None:
     on_arm = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=True)))
     play, bends = (part(w, [0], joint=2) for w in ("joint_backlash", "joint_nonlinear_stiffness"))
     drift = part("thermal_drift", [0])
-    three = replace(said((bends, play, drift), (3e-5, 1e-5, 9e-6), 10.0), log_good=-90.0)
+    three = replace(said((bends, play, drift), (3e-5, 1e-5, 9e-6), 10.0), log_adequate=-90.0)
     both = said((bends, play), (3e-5, 1e-5), 0.0)
     alone = (said((play,), (1e-5,), -200.0), said((bends,), (1e-5,), -260.0))
     case = replace(found, engine=on_arm, explanations=(three, both, *alone), unknown=-800.0)
@@ -84,7 +84,7 @@ def test_what_explains_most_of_a_gap_fits_closely_whatever_its_noise() -> None:
     noise = engine.bench.noise.stated
     for structural, most in ((2 * noise, 2 * noise), (100 * noise, 17 * noise)):
         engine.structural = structural
-        assert may_miss(engine) == pytest.approx(most)
+        assert tolerated_misfit(engine) == pytest.approx(most)
 
 
 def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:
@@ -126,7 +126,7 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         assert p["unknown"] == pytest.approx(unknown, abs=0.1)
         assert (p["thermal_drift"] > 0.9) == (unknown == 0)
     # of a gap that stands out far, what the laws of two are off asks for more
-    none = replace(third, parts=(), sizes=(), log_weight=-1e6, log_good=-1e6)
+    none = replace(third, parts=(), sizes=(), log_weight=-1e6, log_adequate=-1e6)
     for share, unknown in ((0.9, 0.0), (1.1, 0.9)):
         two = said(three[1:], (2e-5, 1e-6), -share * LAW_REMAINDER**2 * 1e6)
         both = replace(found, explanations=(third, two, none), unknown=-1e5, alone={})
@@ -253,7 +253,7 @@ def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> No
     ):
         word = said((creep,), (1e-5,), -20.0, eta)
         odd = said(parts, (1e-5, 0.5e-5)[: len(parts)], 20.0, 0.0)
-        whole = replace(found, explanations=(word,), nameless=(odd,), unknown=-90.0, alone={})
+        whole = replace(found, explanations=(word,), unmodelled=(odd,), unknown=-90.0, alone={})
         given = with_posterior(whole, {}).probabilities
         assert max(given, key=lambda w: given[w]) == main
         assert given.keys() == found.probabilities.keys()
@@ -266,11 +266,11 @@ def test_what_no_word_names_is_looked_up_as_well() -> None:
     variants = library(bench, ["joint_creep"])
     found = search(small_engine_of(bench), variants)
     creep, jerks = part("joint_creep", [0]), part(JERKS, [0])
-    poor = replace(said((creep, jerks), (3e-5, 1e-5), -10.0), log_good=-30.0)
+    poor = replace(said((creep, jerks), (3e-5, 1e-5), -10.0), log_adequate=-30.0)
     far = said((jerks,), (1e-5,), -80.0)
-    one = replace(found, explanations=(said((creep,), (3e-5,)),), nameless=(poor, far))
-    first, second = looked_up(one).nameless
-    assert first.log_good != poor.log_good
+    one = replace(found, explanations=(said((creep,), (3e-5,)),), unmodelled=(poor, far))
+    first, second = reweighted_by_residuals(one).unmodelled
+    assert first.log_adequate != poor.log_adequate
     assert second is far
 
 
@@ -283,7 +283,7 @@ def test_what_is_worth_too_little_for_three_speaks_for_two_of_them() -> None:
     warm, knee, amplifier = (part(w, [0]) for w in ("thermal_drift", "joint_yield", "force_drift"))
     two, one = said((knee, amplifier), (2e-5, 1e-5), -30.0), said((knee,), (2e-5,), -35.0)
     three = said((warm, knee, amplifier), (3e-5, 2e-5, 1e-5))
-    poor = replace(said((warm, knee), (3e-5, 1e-6)), log_good=-60.0)
+    poor = replace(said((warm, knee), (3e-5, 1e-6)), log_adequate=-60.0)
     for whole, heir in ((three, two), (poor, one)):
         fresh = replace(found, engine=on_arm, explanations=(whole, heir), unknown=-800.0, alone={})
         assert with_posterior(fresh, {}).probabilities["joint_yield"] > 0.9
@@ -330,9 +330,9 @@ def test_two_that_are_worth_too_little_may_stand_for_another_one(
         if arm:  # as likely as they are alone
             odds = given["joint_yield"] / given["joint_hysteresis"]
             assert np.log(odds) == pytest.approx(apart, abs=0.2)
-        speaker = speaker_of(fresh, both, {})
+        speaker = find_representative(fresh, both, {})
         assert (speaker is other) is (arm and spoken_by == "joint_yield")
     failed = {frozenset({"joint_yield"}): 0.1}  # it does not foretell what was withheld
     arm = replace(bench, data=replace(bench.data, arm=True))
     on_arm = replace(fresh, engine=replace_bench(found.engine, arm))
-    assert speaker_of(on_arm, both, failed) is None
+    assert find_representative(on_arm, both, failed) is None

@@ -19,7 +19,7 @@ from identification.gap.explanations.several import family_of
 from identification.gap.laws import knees_closer
 from identification.gap.laws.closer import places
 from identification.gap.laws.curves import above, beyond, hinge
-from identification.gap.laws.interval import TWO_SIDED, Softer
+from identification.gap.laws.interval import TWO_SIDED, ComplianceChange
 from identification.gap.laws.knees import is_sharp
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
@@ -261,7 +261,7 @@ def test_bending_of_a_segment_is_its_mean_along_it() -> None:
 def test_a_factor_of_a_spring_knows_the_spring_no_better_than_stated() -> None:
     bench = hanging(UP)
     wrong = next(v for v in library(bench, ["joint_stiffness_error"]))
-    softer = Softer({0: 0.1}, {0: 0.0}, {0: np.zeros(1)})
+    softer = ComplianceChange({0: 0.1}, {0: 0.0}, {0: np.zeros(1)})
     found = parameters(bench, Part(wrong, 1.0), np.array([0.5]), np.zeros((1, 1)), softer)
     factor = found["factor_joint1"]
     assert factor.value == pytest.approx(1 / 1.6)
@@ -395,7 +395,7 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
 def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> None:
     """One strength alone stays small: what bends all at once is a knee."""
     bench = hanging(UP[:5], gravity=0.0)
-    assert bench.course.once
+    assert bench.load_history.monotonic
     found = library(bench, ["joint_hysteresis"])
     whole = next(v for v in found if v.label.endswith("spectrum"))
     span = bench.reach_of(bench.true_torque[:, 0])

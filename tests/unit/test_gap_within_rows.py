@@ -11,7 +11,7 @@ import pytest
 from identification.arrays import Array
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.recording.holds import steadied
-from identification.gap.recording.ramps import ramps_told
+from identification.gap.recording.ramps import with_ramps_marked
 from identification.gap.recording.rows import reduce_rows
 from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
@@ -112,7 +112,7 @@ def test_a_load_on_its_way_to_none_is_no_zero(late: bool) -> None:
     """But a force that is read late, or drifts, is one that nobody loads."""
     force, u, step = ramped(late, drift=0.02)
     branch = np.where(step > 0, 2, 0)
-    rows = reduce_rows(ramps_told(bench_data(force, u, step=step, branch=branch)))
+    rows = reduce_rows(with_ramps_marked(bench_data(force, u, step=step, branch=branch)))
     at_zero = rows.branch == 0
     loaded = at_zero & (rows.displacement > 1e-6)
     assert loaded.any()
@@ -138,7 +138,7 @@ def test_a_run_that_begins_unloaded_comes_from_nowhere() -> None:
     """While it warms up, and its force drifts with that: all of it is read at no load."""
     warm = 1 - np.exp(-np.arange(30) / 10.0)
     data = bench_data(3 * warm, 3e-5 * warm, step=np.zeros(30, dtype=int), branch=np.zeros(30, int))
-    assert reduce_rows(ramps_told(data)).zero.all()
+    assert reduce_rows(with_ramps_marked(data)).zero.all()
 
 
 def test_steps_of_one_number_to_and_fro_are_two_levels() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from identification.gap.answer.notes import KINDS, Note, ordered
-from identification.gap.explanations.explanation import Likeness
+from identification.gap.explanations.explanation import GapPattern
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
 from identification.gap.model.bench import Bench
@@ -177,7 +177,7 @@ def test_a_probability_is_never_said_to_be_one_or_none(p: float, said: str) -> N
 @pytest.mark.parametrize("kind", ["waves", "jumps"])
 def test_a_rig_without_an_arm_is_told_of_no_laser(kind: str) -> None:
     found = shown.unexplained()
-    found = replace(found, result=replace(found.result, looks_like=Likeness(kind, 1e-3, -80.0)))
+    found = replace(found, result=replace(found.result, looks_like=GapPattern(kind, 1e-3, -80.0)))
     assert "laser" in diagnose_text.render(found.result)
     assert "laser" not in diagnose_text.render(shown.without_arm(found).result)
     assert "sensor" in diagnose_text.render(shown.without_arm(found).result)

@@ -11,7 +11,7 @@ from rig.worlds.hidden.draw import draw_case
 from rig.worlds.hidden.effect import Effect
 from rig.worlds.hidden.gap import rms
 from rig.worlds.hidden.label import answers
-from rig.worlds.hidden.observed import look, nuisances
+from rig.worlds.hidden.observed import noise_free_observation, nuisances
 from rig.worlds.hidden.rivals import accepted, left_over
 from rig.worlds.hidden.words import EFFECTS
 from tests.unit.hidden_scenes import effect_of, scene_of
@@ -79,7 +79,7 @@ def test_nuisances_explain_no_knee_even_without_bounds() -> None:
     """Shapes are chosen before bounds count: a nuisance must not hold the answer."""
     scene = scene_of("rich", q=False, components=False)
     drawn = effect_of(scene, "joint_yield", "sharp")
-    seen = look(scene, [drawn.change(2.0)], NOISE_MM)
+    seen = noise_free_observation(scene, [drawn.change(2.0)], NOISE_MM)
     base = np.stack(nuisances(seen)[0], axis=1)
     target = seen.stack(seen.displacement)
     rest = target - base @ np.linalg.lstsq(base, target, rcond=None)[0]

@@ -24,35 +24,35 @@ def test_a_softening_spring_doubles_at_its_softening_load() -> None:
 
 def test_the_delayed_share_follows_with_its_time_constant() -> None:
     spring = Spring(100.0, delayed=0.02, delay_s=2.0)
-    assert spring.take(10.0, 0.0) == pytest.approx(0.098)
-    assert spring.take(10.0, 2.0) == pytest.approx(0.098 + 0.002 * (1 - math.exp(-1)))
-    assert spring.take(10.0, 2.0) == pytest.approx(0.098 + 0.002 * (1 - math.exp(-2)))
-    assert spring.take(10.0, EVER) == pytest.approx(0.1)
-    assert spring.take(0.0, 0.0) == pytest.approx(0.002)
-    assert spring.take(0.0, EVER) == pytest.approx(0.0)
+    assert spring.advance(10.0, 0.0) == pytest.approx(0.098)
+    assert spring.advance(10.0, 2.0) == pytest.approx(0.098 + 0.002 * (1 - math.exp(-1)))
+    assert spring.advance(10.0, 2.0) == pytest.approx(0.098 + 0.002 * (1 - math.exp(-2)))
+    assert spring.advance(10.0, EVER) == pytest.approx(0.1)
+    assert spring.advance(0.0, 0.0) == pytest.approx(0.002)
+    assert spring.advance(0.0, EVER) == pytest.approx(0.0)
 
 
 def test_settling_does_not_depend_on_the_step() -> None:
     fine, coarse = (Spring(100.0, delayed=0.1, delay_s=1.0) for _ in range(2))
     for _ in range(10):
-        last = fine.take(10.0, 0.1)
-    assert last == pytest.approx(coarse.take(10.0, 1.0), rel=1e-12)
+        last = fine.advance(10.0, 0.1)
+    assert last == pytest.approx(coarse.advance(10.0, 1.0), rel=1e-12)
 
 
 def test_yield_remains_until_the_controller_takes_it_back() -> None:
     law = Yield(threshold=56.0, hardening=700.0, return_per_s=0.002)
-    assert law.take(56.0, 1.0) == 0.0
-    assert law.take(63.0, 1.0) == pytest.approx(0.01)
-    assert law.take(0.0, 1.0) == pytest.approx(0.01)
-    assert law.take(63.0, 1.0) == pytest.approx(0.01)  # elastic up to where it has been
-    assert law.take(70.0, 1.0) == pytest.approx(0.02)
+    assert law.advance(56.0, 1.0) == 0.0
+    assert law.advance(63.0, 1.0) == pytest.approx(0.01)
+    assert law.advance(0.0, 1.0) == pytest.approx(0.01)
+    assert law.advance(63.0, 1.0) == pytest.approx(0.01)  # elastic up to where it has been
+    assert law.advance(70.0, 1.0) == pytest.approx(0.02)
     # the elastic range has moved along: 70 - 2 * 56 = -42
-    assert law.take(-42.0, 1.0) == pytest.approx(0.02)
-    assert law.take(-49.0, 1.0) == pytest.approx(0.01)
-    law.retake(1.5)
-    assert law.take(0.0, 1.0) == pytest.approx(0.007)
-    law.retake(EVER)
-    assert law.take(0.0, 1.0) == 0.0
+    assert law.advance(-42.0, 1.0) == pytest.approx(0.02)
+    assert law.advance(-49.0, 1.0) == pytest.approx(0.01)
+    law.return_to_position(1.5)
+    assert law.advance(0.0, 1.0) == pytest.approx(0.007)
+    law.return_to_position(EVER)
+    assert law.advance(0.0, 1.0) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_what_a_law_would_do_is_what_it_does_and_rises_with_load(
         would, more = law.respond(load, 0.1), law.respond(load + further, 0.1)
         assert more >= would - 1e-15
         assert law.respond(load, 0.1) == would  # asking changes nothing
-        assert law.take(load, 0.1) == would
+        assert law.advance(load, 0.1) == would
 
 
 def test_root_of_a_curve_that_gives_way() -> None:

@@ -84,7 +84,7 @@ def present_design(bench: Bench) -> Design:
     if not rows.continuous:
         hold = float(np.median(rows.hold_weight[~rows.zero])) * sample if ~rows.zero.all() else hold
     else:
-        once = max(bench.course.session_span / max(len(np.unique(rows.run)), 1), 1e-6)
+        once = max(bench.load_history.session_span / max(len(np.unique(rows.run)), 1), 1e-6)
         hold, approach, zero, sample = once / 20, 0.0, 0.0, once / 100
     thinned = max(1.0, hold / (_MOST_A_HOLD * sample))
     sizes = np.sign(bench.load) * (np.abs(bench.load) > 0.2 * np.abs(bench.load).max())
@@ -116,7 +116,7 @@ def _averaging(meter: Instruments, samples: float) -> Instruments:
 def _unloads(bench: Bench) -> bool:
     """Whether it comes back step by step, not only to zero at once."""
     if bench.rows.continuous:
-        return bench.course.unloads
+        return bench.load_history.unloads
     return bool(np.any(bench.rows.branch == UNLOADING))
 
 
@@ -142,7 +142,7 @@ def _levels(bench: Bench, s: int) -> tuple[float, ...]:
     top = float(load[np.argmax(np.abs(load))]) if load.size else 0.0
     if not rows.continuous:
         steps = rows.step[mine]
-        loading = (rows.branch[mine] != UNLOADING) & (steps > 0) & ~rows.on_the_way[mine]
+        loading = (rows.branch[mine] != UNLOADING) & (steps > 0) & ~rows.in_ramp[mine]
         found = sorted({int(k) for k in steps[loading]})
         means = [float(load[loading & (steps == k)].mean()) for k in found]
         rising = [v for v in means if v * top > 0]
@@ -200,7 +200,7 @@ def planned(design: Design, bench: Bench) -> GapData:
         output_encoder=design.output_encoder,
         temperature=None,
         curves=None,
-        on_the_way=None,
+        in_ramp=None,
         onward=None,
         imposed="displacement" if bench.imposed else "force",
     )

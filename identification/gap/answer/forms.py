@@ -17,7 +17,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.as_it_stands import Acts, as_it_stands
+from identification.gap.laws.actual_arm import LawValues, bench_of_actual_arm
 from identification.gap.laws.law import AS_IT_STANDS, Law
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
@@ -33,9 +33,9 @@ class Form:
     covariance: Array
 
     @property
-    def acts(self) -> Acts:
+    def acts(self) -> LawValues:
         """What it does, its numbers taken as they are."""
-        return Acts(self.law, self.values)
+        return LawValues(self.law, self.values)
 
 
 def law_of(bench: Bench, variant: Variant) -> tuple[Law, Array]:
@@ -62,7 +62,7 @@ def where_it_acts(bench: Bench, law: Law, beside: Iterable[Form]) -> Bench:
     """The bench of the torques that a law is of: as effects beside it leave them, if it says so."""
     if not law.constants.get(AS_IT_STANDS):
         return bench
-    return as_it_stands(bench, (form.acts for form in beside))
+    return bench_of_actual_arm(bench, (form.acts for form in beside))
 
 
 def realise(bench: Bench, form: Form, beside: Iterable[Form] = ()) -> Array:

@@ -12,10 +12,10 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint, troubles_named
-from identification.gap.judging.broken import broken
-from identification.gap.judging.earned import noise_of
+from identification.gap.judging.cross_validation import noise_of
 from identification.gap.judging.heldout import HeldOut
-from identification.gap.judging.strain import what_is_strained
+from identification.gap.judging.limit_violation import limit_violation
+from identification.gap.judging.prior_conflict import what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import SWINGS
 from identification.gap.words import BETWEEN_RUNS
@@ -44,14 +44,14 @@ def left_out(chosen: Explanation, fuller: Explanation | None, after: float) -> t
     after: rms m that is left without them."""
     if fuller is None or fuller.words <= chosen.words:
         return ()
-    small = {w: s for w, s in fuller.troubles.items() if w not in chosen.words}
-    larger = max(small.values()) > max(chosen.troubles.values())
+    small = {w: s for w, s in fuller.rms_by_word.items() if w not in chosen.words}
+    larger = max(small.values()) > max(chosen.rms_by_word.values())
     most = max(small.values()) > _MOST_LEFT * after
     text = (
         f"{' and '.join(f'{w} ({1e3 * s:.2g} mm rms)' for w, s in small.items())} beside it would "
         f"explain {fuller.log_weight - chosen.log_weight:.0f} nats more"
         f"{f', most of the {1e3 * after:.2g} mm that are left' if most else ''}. "
-        f"So {'few nats' if larger else 'little'} beside {' and '.join(chosen.troubles)} may as "
+        f"So {'few nats' if larger else 'little'} beside {' and '.join(chosen.rms_by_word)} may as "
         "well be how far that law is off: it is not named. To see it: "
         f"{' '.join(f'--add {w}' for w in small)}."
     )
@@ -115,7 +115,7 @@ def called(found: SearchResult, chosen: Explanation, verdict: str) -> tuple[Note
     if not arm or verdict not in FLANKS or not flanks_of_one_joint(chosen):
         return ()
     (other,), named = FLANKS - {verdict}, troubles_named(chosen, found.explanations)
-    if other in named or chosen.troubles[verdict] > chosen.troubles[other]:
+    if other in named or chosen.rms_by_word[verdict] > chosen.rms_by_word[other]:
         return ()
     text = (
         f"{verdict} and {other} of one joint are one trouble: the flanks of a play are curved. It "
@@ -195,8 +195,8 @@ def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
     best, swings = found.explanations[0], found.engine.bench.noise.swings
     if verdict != "unknown":
         return ()
-    words, fitted = " and ".join(best.troubles), fit(found.engine, best)
-    off, word = broken(found.engine, best, fitted)
+    words, fitted = " and ".join(best.rms_by_word), fit(found.engine, best)
+    off, word = limit_violation(found.engine, best, fitted)
     asks = what_is_strained(found.engine, fitted, best.eta) if found.engine.bench.data.arm else ""
     look = " See whether META states too small an uncertainty." if asks else ""
     if off > 1:

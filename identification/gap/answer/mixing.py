@@ -13,7 +13,7 @@ from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 # Of 78 parameters in blind mixtures 78 % lay within what should have been 90 % intervals, of 94
 # alone 89 %: what one law leaves of the gap its neighbours take, and the posterior does not know
-# that the laws are only families. The same rule as with probabilities (`verdict.trusted`).
+# that the laws are only families. The same rule as with probabilities (`verdict.discounted`).
 SHARING = 1.25
 
 

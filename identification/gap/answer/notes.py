@@ -11,7 +11,7 @@ import numpy as np
 from identification.gap.data import GapData
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY
-from identification.gap.recording.snaps import Snaps
+from identification.gap.recording.force_drops import ForceDrops
 
 FAULT, ASIDE, UNDECIDED, REMARK = KINDS = ("fault", "set aside", "undecided", "remark")
 
@@ -46,7 +46,7 @@ def _faults(bench: Bench) -> Iterator[str]:
             f"Force and displacement read one number each, {len(force)} times: real channels "
             "scatter. See whether they were connected."
         )
-    yield from (f.text for f in bench.course.faults)
+    yield from (f.text for f in bench.load_history.faults)
     if bench.data.force_scatters > NOISY:
         yield (
             f"The force scatters {bench.data.force_scatters:.0f} times as much as stated while the "
@@ -76,7 +76,7 @@ def _nothing_moves(bench: Bench) -> Iterator[str]:
 
 def _undecided(bench: Bench) -> Iterator[str]:
     data, rows = bench.data, bench.rows
-    if not bench.course.unloads:
+    if not bench.load_history.unloads:
         yield "Nothing was unloaded: lasting and elastic deflection look alike."
     if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
         yield "One repetition: what repeats and what does not can't be told apart."
@@ -88,7 +88,7 @@ def _undecided(bench: Bench) -> Iterator[str]:
             yield f"Joint readings are taken before the gear: {alike}."
     if data.session is None and data.arm:
         yield "No session clock: drifts are seen only within runs and from run to run."
-    if bench.course.timeless:
+    if bench.load_history.timeless:
         yield "No time was recorded: lags, creep and how fast it flowed are left out."
     elif not data.timed:
         yield "No time was recorded: readings are counted as one a second, and so are all times."
@@ -105,8 +105,8 @@ def _remarks(bench: Bench) -> Iterator[str]:
             "What the model's effects leave stays here while the arm goes from pose to pose. A "
             "model that was made in one pose can't know that, and the gap is what goes beyond it."
         )
-    if bench.course.let_go:
-        yield _let_go(bench.course.let_go, bench.data)
+    if bench.load_history.let_go:
+        yield _let_go(bench.load_history.let_go, bench.data)
     beyond = int(np.count_nonzero(bench.rows.overshoot))
     if beyond:
         yield (
@@ -124,11 +124,11 @@ def _remarks(bench: Bench) -> Iterator[str]:
         )
 
 
-def _let_go(snaps: Snaps, data: GapData) -> str:
+def _let_go(snaps: ForceDrops, data: GapData) -> str:
     span = float(np.ptp(data.force))
     times = "once" if snaps.count == 1 else f"{snaps.count} times"
     return (
         f"The force falls at once while the stroke goes on, {times}, by up to "
-        f"{snaps.largest * span:.3g} N (first {data.moment(snaps.first)}): it sticks and slips, "
-        "snaps, cracks or is torn off, as no effect of the library does."
+        f"{snaps.largest * span:.3g} N (first {data.time_label(snaps.first)}): it sticks and "
+        "slips, snaps, cracks or is torn off, as no effect of the library does."
     )

@@ -21,15 +21,15 @@ from __future__ import annotations
 from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.interval import NOMINAL, Coefficients, Parameter, Softer
+from identification.gap.laws.interval import NOMINAL, Coefficients, ComplianceChange, Parameter
 from identification.gap.model.bench import Bench
 
 
 def parameters(
-    bench: Bench, part: Part, w: Array, cov: Array, softer: Softer = NOMINAL
+    bench: Bench, part: Part, w: Array, cov: Array, softer: ComplianceChange = NOMINAL
 ) -> dict[str, Parameter]:
     """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
     coefficients and their covariance; softer: what the springs turned out to be."""
-    stands = part.variant.stands
+    stands = part.variant.to_actual_bench
     there = bench if stands is None else stands(bench)
     return EFFECTS[part.word].parameters(there, part.variant, Coefficients(w, cov, softer))

@@ -12,7 +12,7 @@ from identification.gap.answer.mixing import apart, mixture, stretched, wider
 from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
 from identification.gap.effects.base_slip import ACROSS, slides
-from identification.gap.evidence.compare import Scored, likelier_there, logsumexp, score
+from identification.gap.evidence.compare import Scored, log_prior_of_joint, logsumexp, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import IMPERFECTION, STEP, level_priors
 from identification.gap.evidence.parts import Part, energies, log_joints, part_sizes, signs_kept
@@ -21,7 +21,7 @@ from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.penalties import SAME_JOINT, minor_parts
 from identification.gap.explanations.several import family_of
 from identification.gap.laws.effect import declared
-from identification.gap.laws.interval import Parameter, Softer
+from identification.gap.laws.interval import ComplianceChange, Parameter
 from identification.gap.model.variants import Variant, place_of
 from identification.gap.search.readings import as_moved
 from identification.gap.search.shares import sized
@@ -252,7 +252,7 @@ def _open(engine: Engine, variants: Sequence[Variant], chosen: Explanation, inde
     out = []
     for shape, more in shapes:
         parts = (*chosen.parts[:index], shape, *chosen.parts[index + 1 :])
-        likely = shape.variant.log_prior + likelier_there(engine, shape.variant) + more
+        likely = shape.variant.log_prior + log_prior_of_joint(engine, shape.variant) + more
         each = _levels(engine, replace(chosen, parts=parts), likely)
         level = max(range(len(each)), key=lambda i: each[i][1])
         charge = max(SAME_JOINT * _crowds(shape, rest), _petty(engine, parts, level))
@@ -316,10 +316,10 @@ def _size(engine: Engine, i: int, energy: float) -> float:
     return float(min(IMPERFECTION * energy**0.5, etas[1] / STEP**0.5))
 
 
-def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
+def _softer(engine: Engine, fitted: Fit, index: int) -> ComplianceChange:
     """The springs beside an effect, with what their uncertainty has in common with it."""
     mine, covariance, at = fitted.among_all(index), fitted.joint_covariance, engine.base.springs
-    return Softer(
+    return ComplianceChange(
         {j: float(fitted.base[i]) for j, i in at.items()},
         {j: float(covariance[i, i]) for j, i in at.items()},
         {j: covariance[i, mine] for j, i in at.items()},

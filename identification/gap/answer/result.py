@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement
+from identification.gap.answer.equivalent_places import equivalent_place
 from identification.gap.answer.forms import describe, lasting, realise
 from identification.gap.answer.found_notes import (
     across,
@@ -27,13 +28,12 @@ from identification.gap.answer.notes import FAULT, Note, notes_of, ordered
 from identification.gap.answer.posterior import Known
 from identification.gap.answer.same_force import same_force
 from identification.gap.answer.scale import off_scale
-from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
-from identification.gap.explanations.explanation import Explanation, Likeness, SearchResult
+from identification.gap.explanations.explanation import Explanation, GapPattern, SearchResult
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.verdict import speaker_of
-from identification.gap.judging.earned import left_of, noise_of, sample_rms
+from identification.gap.explanations.verdict import find_representative
+from identification.gap.judging.cross_validation import left_of, noise_of, sample_rms
 from identification.gap.judging.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.laws.interval import Parameter
 from identification.gap.model.bench import Bench
@@ -85,7 +85,7 @@ class GapResult:
     runners_up: dict[str, float]
     next_measurement: NextMeasurement | None
     remainder: float
-    looks_like: Likeness | None
+    looks_like: GapPattern | None
     said: tuple[Note, ...]
     bench: Bench
     engine: Engine
@@ -186,10 +186,10 @@ def _as_written(engine: Engine, fitted: Fit) -> float | None:
     return sample_rms(bench, gives)
 
 
-def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> Likeness | None:
+def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> GapPattern | None:
     """Of an unknown gap; none where what is said is that META is wrong, or of one whose channels
     count in opposite senses, or of which one says nothing."""
-    faults, wrong = found.engine.bench.course.faults, any(n.kind == FAULT for n in said)
+    faults, wrong = found.engine.bench.load_history.faults, any(n.kind == FAULT for n in said)
     if verdict != "unknown" or wrong or any(f.kind in (SIGNS, SILENT) for f in faults):
         return None
     return found.looks_like
@@ -198,9 +198,9 @@ def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> Like
 def _effects(
     found: SearchResult, chosen: Explanation, known: list[Known]
 ) -> tuple[EffectFound, ...]:
-    all_of_them = (*found.explanations, *found.nameless)
+    all_of_them = (*found.explanations, *found.unmodelled)
     weights = np.array(
-        [e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300) for e in all_of_them]
+        [e.log_adequate + log(found.kept.get(e.words, 1.0) + 1e-300) for e in all_of_them]
     )
     share = np.exp(weights - weights.max())
     total = float(share.sum())
@@ -230,7 +230,7 @@ def _effects(
 
 def _said(found: SearchResult, explanation: Explanation) -> frozenset[str]:
     """What speaks for it says that is there."""
-    speaker = speaker_of(found, explanation, found.kept)
+    speaker = find_representative(found, explanation, found.kept)
     return frozenset() if speaker is None else speaker.words
 
 
@@ -249,7 +249,7 @@ def with_twins(result: GapResult, chosen: Explanation, withheld: set[str]) -> Ga
     the likeliest for, stays the most probable word."""
     probabilities, effects = dict(result.probabilities), []
     for i, (effect, part) in enumerate(zip(result.effects, result.fit.parts, strict=True)):
-        twin = twin_of(result.engine, part, result.fit.of(i)[0], chosen.eta)
+        twin = equivalent_place(result.engine, part, result.fit.of(i)[0], chosen.eta)
         same = [twin.word] if twin is not None and twin.word not in withheld else []
         alike = tuple(dict.fromkeys([*effect.indistinguishable_from, *same]))
         effects.append(replace(effect, indistinguishable_from=alike))

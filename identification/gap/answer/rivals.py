@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from identification.arrays import Array
+from identification.gap.answer.equivalent_places import PLACE, equivalent_place
 from identification.gap.answer.forms import Form, describe, lasting, law_of, lawful
-from identification.gap.answer.twins import PLACE, twin_of
 from identification.gap.evidence.compare import Scored, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
@@ -73,7 +73,7 @@ def same_elsewhere(
         return None
     fitted = fit(found.engine, chosen)
     w, _ = fitted.of(chosen.parts.index(part))
-    twin = twin_of(found.engine, part, w, chosen.eta)
+    twin = equivalent_place(found.engine, part, w, chosen.eta)
     if twin is None or twin.word != word:
         return None
     shapes = tuple(

@@ -55,7 +55,7 @@ EFFECTS: dict[str, Effect] = {effect.word: effect for effect in _ALL}
 def library(bench: Bench, words: Iterable[str] = WORDS) -> list[Variant]:
     """All variants of the words; the pool of the bench holds their columns afterwards."""
     out: list[Variant] = []
-    idle = bench.rows.continuous and bench.course.stands
+    idle = bench.rows.continuous and bench.load_history.stands
     for word in words:
         if idle and word not in STANDING:
             continue

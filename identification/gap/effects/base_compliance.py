@@ -44,12 +44,12 @@ def moments(bench: Bench, depth: float) -> Array:
         below = np.array([0.0, 0.0, depth])
         arm.append(s.moment + np.cross(below, s.unit_vector))
     simulated = np.stack(arm)[bench.rows.setup]
-    return simulated if bench.stands is None else simulated + bench.stands.moment
+    return simulated if bench.arm_state is None else simulated + bench.arm_state.moment
 
 
 def moments_of_load(bench: Bench, depth: float, load: Array) -> Array:
     """(n, 3) Nm about these axes under a load (n,) N along the direction, and what pulls across."""
-    along, there = moments(bench, depth) * load[:, None], bench.stands
+    along, there = moments(bench, depth) * load[:, None], bench.arm_state
     if there is None:
         return along
     return np.asarray(along + there.twist + np.cross([0.0, 0.0, depth], there.force))
@@ -57,7 +57,7 @@ def moments_of_load(bench: Bench, depth: float, load: Array) -> Array:
 
 def _carried(bench: Bench, depth: float) -> Array:
     """(n, 3) Nm of the load, as it acts."""
-    ahead = 0.0 if bench.stands is None else bench.stands.ahead
+    ahead = 0.0 if bench.arm_state is None else bench.arm_state.ahead
     return moments_of_load(bench, depth, bench.load + ahead)
 
 

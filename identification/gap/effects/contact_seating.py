@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.laws.closer import Word, closing_in
+from identification.gap.laws.closer import RefinementTarget, closing_in
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, factors
 from identification.gap.laws.law import Law, Laws, Term
@@ -76,7 +76,7 @@ def variants(bench: Bench) -> list[Variant]:
     """Per force scale and law, also with some that stays, and a mixture of scales. What bears both
     ways is no seat: what is slack there is a play."""
     top = float(np.abs(bench.load).max())
-    if not top > 0 or not (bench.data.arm or bench.course.force_keeps_its_sign):
+    if not top > 0 or not (bench.data.arm or bench.load_history.force_keeps_its_sign):
         return []
     scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
     out: list[Variant] = []
@@ -108,7 +108,7 @@ def variants(bench: Bench) -> list[Variant]:
         )
     )
     if bench.data.arm:
-        rubs = RUBS if bench.course.unloads else ()
+        rubs = RUBS if bench.load_history.unloads else ()
         out += [
             _one_after_the_other(bench, [s * top for s in STEPS], scales, friction * top)
             for friction in (0.0, *rubs)
@@ -209,7 +209,7 @@ def pressed(bench: Bench) -> tuple[Array, Array]:
     """Force (n,) N on the seat and its sense. A bench that is loaded from one side presses on it
     from where its load begins, wherever the zero of its force is; an imposed stroke may begin on
     the way there."""
-    if bench.data.arm or not bench.course.force_keeps_its_sign:
+    if bench.data.arm or not bench.load_history.force_keeps_its_sign:
         return np.abs(bench.load), np.sign(bench.load)
     force = bench.rows.measured_force
     sense = 1.0 if force.max() >= -force.min() else -1.0
@@ -241,7 +241,7 @@ def _slacks(bench: Bench) -> list[Variant]:
         laws=laws,
     )
     out = [v for vs in single.values() for v in vs]
-    if bench.course.approaches:
+    if bench.load_history.approaches:
         out += [_then_seats(bench, s * stroke, 1 / len(SLACKS)) for s in SLACKS]
     return [*out, several]
 
@@ -372,7 +372,7 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return [bench.outside_column(lost(bench, *one)) for one in each]
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     bench = word.engine.bench
     arm = bench.data.arm and not bench.imposed  # of an imposed stroke only slacks are told
     kinds = {met_closely(s.variant, arm=arm): s for s in reversed(word.alone)}

@@ -86,7 +86,7 @@ def _quick(bench: Bench, label: str, way: FreePath) -> FreePath:
     inertia, and which the zero plateaus show."""
     if label != WINDING:
         return way
-    pieces = min(int(bench.course.session_span / _BIAS_S), _MOST_BIAS)
+    pieces = min(int(bench.load_history.session_span / _BIAS_S), _MOST_BIAS)
     return way._replace(pieces=max(way.pieces, pieces))
 
 

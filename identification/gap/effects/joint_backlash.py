@@ -32,7 +32,7 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.laws import lost_motion_law
-from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
+from identification.gap.laws.closer import RefinementTarget, closing_in, nearly_leads, places, seen
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flanks import Flanks, placed, shapes
 from identification.gap.laws.interval import Coefficients, Parameter, normal
@@ -114,7 +114,7 @@ def variants(bench: Bench) -> list[Variant]:
 def _pressed(bench: Bench) -> bool:
     """A rig without an arm that is loaded from one side: a play within its load is seldom, and as
     sharp as it was found; what is smooth there is a seat, or a curve."""
-    return not bench.data.arm and bench.course.one_sided
+    return not bench.data.arm and bench.load_history.one_sided
 
 
 def _by_preload(bench: Bench) -> float:
@@ -364,7 +364,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     return {"width": normal(seen.value, sd**2, seen.unit)}
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     """Beside the leading word; and alone, where it explains nearly as much: that may be a curve
     which does what the play does. Ends of which one is softer where a play is there to see."""
     shown = seen(word)

@@ -25,14 +25,14 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.evidence.compare import closest
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.closer import Word, closing_in, estimates, places, shows
+from identification.gap.laws.closer import RefinementTarget, closing_in, estimates, places, shows
 from identification.gap.laws.curves import BENT_SLOPE
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, factors
 from identification.gap.laws.law import ANEW, Law, Laws, Term
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import retarded, unread_way
-from identification.gap.model.variants import SET_UP_ANEW, Variant, smooth_root, variant
+from identification.gap.model.history import retarded, unread_ramp_duration
+from identification.gap.model.variants import RESET_PER_SETUP, Variant, smooth_root, variant
 
 WORD = "joint_creep"
 SCALES = (0.02, 0.06, 0.2, 0.6)
@@ -47,23 +47,23 @@ def times(bench: Bench) -> np.ndarray:
     runs on, or of a rig without an arm, to three times its length: a viscous flow looks like a line
     then."""
     step = bench.rows.row_time or 1.0
-    longest = min(bench.course.session_span / 3, _LONGEST * max(step, 1.0))
+    longest = min(bench.load_history.session_span / 3, _LONGEST * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
         step = bench.rows.sample_time  # of rows there are the fewer, the longer it stood
-    if not (bench.data.arm or bench.course.always_moves):
-        longest = 3 * bench.course.session_span
-    first = max(step * 3 if bench.course.always_moves else step, 1e-6)
-    if bench.course.one_rate and bench.course.returns:
-        first = max(first, _OF_A_STROKE * bench.course.stroke_s)
+    if not (bench.data.arm or bench.load_history.always_moves):
+        longest = 3 * bench.load_history.session_span
+    first = max(step * 3 if bench.load_history.always_moves else step, 1e-6)
+    if bench.load_history.one_rate and bench.load_history.returns:
+        first = max(first, _OF_A_STROKE * bench.load_history.stroke_s)
     count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
     out = np.asarray(first * 3.0 ** np.arange(count))
-    return np.append(out, VISCOUS * bench.course.session_span) if bench.data.arm else out
+    return np.append(out, VISCOUS * bench.load_history.session_span) if bench.data.arm else out
 
 
 def in_a_run(bench: Bench, times_s: Array) -> Array:
     """(k,) in how many units of its coefficient an element of a time (k,) s ends: what flows counts
     by what it does under a load that stands for one run, however many runs there are."""
-    flows = times_s >= VISCOUS * bench.course.session_span
+    flows = times_s >= VISCOUS * bench.load_history.session_span
     return np.where(flows, times_s / max(run_seconds(bench), bench.rows.row_time, 1e-6), 1.0)
 
 
@@ -71,7 +71,7 @@ def scales(bench: Bench) -> tuple[float, ...]:
     """Of the simulated spring's compliance. Tissue, gels and melts on rigs without an arm go on to
     whatever was seen, thousands of times what the spring gives at once."""
     given = bench.slope * bench.load  # a load that stands came from zero before anybody looked
-    simulated = float(np.ptp(np.append(given, 0.0) if bench.course.rests else given))
+    simulated = float(np.ptp(np.append(given, 0.0) if bench.load_history.rests else given))
     if bench.data.arm or not simulated > 0:
         return SCALES
     seen = bench.reach / simulated
@@ -81,7 +81,7 @@ def scales(bench: Bench) -> tuple[float, ...]:
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: single times with their neighbour, and the whole spectrum; none of one pull that
     never stood: how fast it went and how far are one thing there, and a curve is simpler."""
-    if bench.course.never_held or bench.course.timeless:
+    if bench.load_history.never_held or bench.load_history.timeless:
         return []
     spectrum = times(bench)
     out, sizes = [], scales(bench)
@@ -92,21 +92,23 @@ def variants(bench: Bench) -> list[Variant]:
             name, likely = f"joint {j + 1}{memory}", _LIKELY[memory]
             pairs = (0.3 if bench.data.arm else 0.5) * likely
             out += _family(name, columns, spectrum, sizes, 0.5 * likely, pairs, info)
-        if bench.data.arm or not bench.course.one_rate:  # else it would be a loop of any shape
+        if (
+            bench.data.arm or not bench.load_history.one_rate
+        ):  # else it would be a loop of any shape
             columns = _elements(bench, j, spectrum, None, is_bent=True)
             info = {"joint": j, "memory": "", "bent": True}
             out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
     return out
 
 
-_LIKELY = {"": 1.0, SET_UP_ANEW: 0.5}
+_LIKELY = {"": 1.0, RESET_PER_SETUP: 0.5}
 
 
 def _memories(bench: Bench) -> dict[str, Flags | None]:
     """When nothing is left of what crept before: never, or when the rig is set up anew."""
     out: dict[str, Flags | None] = {"": None}
     if np.sum(bench.rebuilt) > 1:
-        out[SET_UP_ANEW] = bench.rebuilt
+        out[RESET_PER_SETUP] = bench.rebuilt
     return out
 
 
@@ -211,7 +213,7 @@ _SEEN_TO = 9.0  # times the last time that ends, up to where flowing is one with
 _FINE_PRIOR = 1.5  # of them all, over that of the pair, of which they reach over one and a half
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     """About the best pairs, at every joint that they may sit in: where joints look alike, that one
     was looked at more closely is no evidence."""
     if not shows(word):
@@ -250,7 +252,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     )
     joint = v.info.get("joint")
     line = BENT_SLOPE if v.info.get("bent") else 1.0
-    found = _whenever_it_came(bench, found, times)
+    found = _with_arrival_uncertainty(bench, found, times)
     return {
         "creep_fraction": found.per_spring(np.full(len(times), line), joint),
         "creep_fraction_of_run": found.per_spring(
@@ -261,11 +263,11 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     }
 
 
-def _whenever_it_came(bench: Bench, found: Coefficients, times: Array) -> Coefficients:
+def _with_arrival_uncertainty(bench: Bench, found: Coefficients, times: Array) -> Coefficients:
     """Coefficients as uncertain as the moment at which a load came to its level, which no reading
     shows: anywhere on its way there (a rectangular distribution, GUM 4.3.7). What had crept before
     the first reading, `dt / T` of it, is taken for the spring's."""
-    way = unread_way(bench.rows) or 0.0
+    way = unread_ramp_duration(bench.rows) or 0.0
     early = np.minimum(way / 12**0.5 / times, _MOST)
     moves = found.w * early * (1 + float(np.sum(found.w)))
     return replace(found, cov=found.cov + np.outer(moves, moves))

@@ -33,7 +33,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws import friction_forms, friction_law
-from identification.gap.laws.closer import Word, places
+from identification.gap.laws.closer import RefinementTarget, places
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.friction_forms import (
     ARM_RADII,
@@ -59,7 +59,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.path import Path, with_loads, worked_in
 from identification.gap.model.variants import (
     LASTING,
-    SET_UP_ANEW,
+    RESET_PER_SETUP,
     UNDER_WEIGHT,
     Variant,
     smooth_root,
@@ -84,7 +84,7 @@ def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands, from no load or from the weight that came
     on first; lost when the rig is turned to another direction, or in the rest between runs; there
     from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
-    if not bench.data.arm and not bench.course.returns:  # pulls show a curve, and no loop
+    if not bench.data.arm and not bench.load_history.returns:  # pulls show a curve, and no loop
         return []
     out = []
     for j in bench.moving_joints():
@@ -100,12 +100,14 @@ def _memories(bench: Bench, joint: int) -> dict[str, Path]:
     """What a joint's friction may remember."""
     torque = bench.true_torque[:, joint]
     out = {"": bench.path(torque)}
-    if not bench.course.once:
+    if not bench.load_history.monotonic:
         out[WORKED_IN] = worked_in(out[""])
     if np.sum(bench.rebuilt) > np.sum(bench.moved):
-        out[SET_UP_ANEW] = bench.path(torque, bench.rebuilt)
+        out[RESET_PER_SETUP] = bench.path(torque, bench.rebuilt)
     # friction that never was seen to turn, and of which nothing stays, is a curve
-    if np.sum(bench.rest) > np.sum(bench.moved) and (bench.course.unloads or not bench.data.arm):
+    if np.sum(bench.rest) > np.sum(bench.moved) and (
+        bench.load_history.unloads or not bench.data.arm
+    ):
         out[" rested"] = bench.path(torque, bench.moved | bench.rest)
     if bench.feels_weight(joint):
         out[UNDER_WEIGHT] = bench.path(torque, weight=bench.weight(joint))
@@ -158,7 +160,7 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
         reach /= NEARER if found.info["law"] in BY_LOAD else 1.0
         finer = _exponential(bench, joint, name, reach / span, path)
-    elif not bench.data.arm and bench.course.unloads:
+    elif not bench.data.arm and bench.load_history.unloads:
         finer = _spectra(bench, joint, name, span, path, _between(RADII))
         if bench.imposed:
             finer += _spectra(bench, joint, f"{name} stiff", span, path, _between(WITH_STIFF))
@@ -199,8 +201,8 @@ def further(bench: Bench, found: Variant) -> list[Variant]:
         return []
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     name, path = _as_found(bench, found)
-    out = [] if bench.course.once else growing(bench, joint, name, path)
-    if bench.course.unloads and not hangs(found):  # about no load, so of no weight
+    out = [] if bench.load_history.monotonic else growing(bench, joint, name, path)
+    if bench.load_history.unloads and not hangs(found):  # about no load, so of no weight
         out += saturating(bench, joint, name, path)
     return _remembering(out, memory)
 
@@ -213,8 +215,8 @@ def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> lis
     if bench.imposed and not bench.data.arm:
         (stiff,) = _spectra(bench, joint, f"{name} stiff", span, path, WITH_STIFF)
         found += [stiff, *_pairs(bench, name, span, stiff, 1)[: len(STIFF)]]
-    if not bench.course.once:  # a curve that saturates would be taken for friction
-        reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
+    if not bench.load_history.monotonic:  # a curve that saturates would be taken for friction
+        reaches = np.array(REACHES if bench.load_history.unloads else REACHES[:2])
         found += _exponential(bench, joint, name, reaches, path)
     if memory == "":
         found += slackening(bench, joint, name, path)
@@ -233,9 +235,9 @@ def _spectra(
     also where the stated spring is that of small loads, which make nothing slip: then every element
     adds its play (Prandtl 1928)."""
     torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    seen = strengths if bench.course.unloads else strengths[:_SMALL]
+    seen = strengths if bench.load_history.unloads else strengths[:_SMALL]
     radius = span * np.array(ARM_RADII if bench.data.arm else seen)
-    radius = bench.radii(torque, radius) if bench.course.unloads else radius
+    radius = bench.radii(torque, radius) if bench.load_history.unloads else radius
     radius = np.append(radius, NEVER * span)
     slips = path.plays(radius)
     laws = [("Iwan", radius, slips - torque[:, None])]
@@ -262,7 +264,7 @@ def _pairs(bench: Bench, name: str, span: float, whole: Variant, conventions: in
     law, joint = whole.info["law"], int(whole.info["joint"])
     largest = float(np.abs(bench.true_torque[:, joint]).max())
     most = int(np.sum(radius < (largest if law == "Prandtl" else NEVER * span))) - 1
-    alone = most if bench.imposed else min(_SMALL + bench.course.unloads, most)
+    alone = most if bench.imposed else min(_SMALL + bench.load_history.unloads, most)
     for k in range(alone):
         out.append(
             shape(
@@ -306,7 +308,7 @@ def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path
     return out
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     bench, out = word.engine.bench, []
     for s in places(word.alone, word.beside):
         out += closer(bench, s.variant)

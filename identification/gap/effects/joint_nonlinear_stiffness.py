@@ -21,7 +21,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws import elastic_law
-from identification.gap.laws.closer import Word, closing_in
+from identification.gap.laws.closer import RefinementTarget, closing_in
 from identification.gap.laws.curves import above, beyond, hinge
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.elastic_forms import (
@@ -58,7 +58,7 @@ def variants(bench: Bench) -> list[Variant]:
             continue
         line = bench.add_joint(j, bench.compliance[j] * top * (torque / top))
         out += _alike_both_ways(bench, j, line, top)
-        if not bench.data.arm and bench.course.once and not bench.course.rests:
+        if not bench.data.arm and bench.load_history.monotonic and not bench.load_history.rests:
             out += locks(bench, j, line, top) + level_by_level(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
             out.append(fine(bench, j, line, top))
@@ -194,14 +194,14 @@ TOOLS_KG = (0.5, 1.5, 2.5)
 
 
 def _came_back(bench: Bench) -> bool:
-    return bench.course.unloads or bench.course.repeats
+    return bench.load_history.unloads or bench.load_history.repeats
 
 
 def _both_ways(bench: Bench, j: int) -> bool:
     """Pulled and pressed, from zero either way, or to and fro, or through a zero that both channels
     share: any other half of a loop could be anything. Joints of an arm that carry weights have
     curves of the net torque (`_net`)."""
-    course = bench.course
+    course = bench.load_history
     if bench.data.arm:
         return bench.pushed_both_ways(j) and not bench.feels_weight(j)
     if course.one_sided:
@@ -232,7 +232,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     return {"change_of_compliance_over_range": p}
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     odd = [s for s in word.alone if "line" in s.variant.info]
     bends = [s for s in word.alone if s.variant.form == BEND]
     return [*closing_in(word, corners, bends[:1]), *closing_in(word, refined, odd[:1])]

@@ -25,8 +25,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws import knees_closer
+from identification.gap.laws.bauschinger import flowing_back
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.flow_back import flowing_back
 from identification.gap.laws.flows import Flow
 from identification.gap.laws.interval import Parameter
 from identification.gap.laws.knees import THRESHOLDS, knee_variants, knees
@@ -37,7 +37,12 @@ from identification.gap.laws.memories import fresh_of, memories
 from identification.gap.laws.specimens import OWN, off, own_stiffness, with_other_springs
 from identification.gap.laws.thresholds import moved, of_knee
 from identification.gap.model.bench import TOOL_SD_KG, Bench
-from identification.gap.model.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, UNDER_WEIGHT, Variant
+from identification.gap.model.variants import (
+    BACK_UNDER_WEIGHT,
+    RESET_PER_RUN,
+    UNDER_WEIGHT,
+    Variant,
+)
 from identification.uncertainty import TWO_SIDED
 
 WORD = "joint_yield"
@@ -86,7 +91,7 @@ def _under_weight(
     if most - alone < _PUSHED * top or not bench.meets_weight_unlike(joint):
         return []
     radius, out = alone + (most - alone) * np.array(THRESHOLDS), []
-    taken_back = [BACK_UNDER_WEIGHT] if TAKEN_BACK in memories(bench) else []
+    taken_back = [BACK_UNDER_WEIGHT] if RESET_PER_RUN in memories(bench) else []
     for memory in (UNDER_WEIGHT, *taken_back):
         fresh = fresh_of(bench, memory)
         # what a controller takes back it had clamped: no metal that flows back

@@ -35,7 +35,7 @@ from identification.gap.laws.across_law import (
 )
 from identification.gap.laws.closer import best_about_springs
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Coefficients, Parameter, Softer, normal
+from identification.gap.laws.interval import Coefficients, ComplianceChange, Parameter, normal
 from identification.gap.laws.law import Laws
 from identification.gap.model.base import CROSSTALK, MOST_CROSSTALK
 from identification.gap.model.bench import Bench
@@ -267,7 +267,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     return out
 
 
-def _unsure(bench: Bench, direction: str, k: int, softer: Softer) -> float:
+def _unsure(bench: Bench, direction: str, k: int, softer: ComplianceChange) -> float:
     """Relative variance of what a force along tangent k of a direction does, by the springs that it
     goes through, as far as displacement and joint readings tell of each."""
     noise = bench.noise

@@ -26,7 +26,7 @@ from identification.gap.evidence.compare import Scored, by_word, closest, margin
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import conditioned
-from identification.gap.laws.closer import Word, estimate, evidence
+from identification.gap.laws.closer import RefinementTarget, estimate, evidence
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, triple
@@ -274,7 +274,7 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     ]
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     """Where arm and tool are, by what is found alone and beside the words that explain most of
     what that leaves: a second effect must not decide it."""
     engine, kinds = word.engine, {_kind(s.variant): s for s in reversed(word.alone)}

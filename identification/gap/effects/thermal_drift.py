@@ -131,8 +131,8 @@ def _late(bench: Bench) -> list[Variant]:
 
 def _lags(bench: Bench) -> Array:
     """(k,) s: of the session, as far as a few rows tell of one."""
-    lags = np.array(LAGS) * bench.course.session_span
-    return lags[lags > _SEEN * bench.course.session_span / bench.rows.n]
+    lags = np.array(LAGS) * bench.load_history.session_span
+    return lags[lags > _SEEN * bench.load_history.session_span / bench.rows.n]
 
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws.closer import (
-    Word,
+    RefinementTarget,
     closing_in,
     evidence,
     scored_beside,
@@ -41,7 +41,7 @@ from identification.gap.laws.springs_found import about_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import (
     sampling_time,
-    unread_way,
+    unread_ramp_duration,
 )
 from identification.gap.model.variants import Variant, variant
 
@@ -59,14 +59,14 @@ _OF_STROKE = 0.5  # of the time that one pass of the load takes
 
 def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
-    if bench.course.timeless or bench.data.lets_go or _like_a_soft_start(bench):
+    if bench.load_history.timeless or bench.data.lets_go or _like_a_soft_start(bench):
         return []  # a channel that is late would let go at another place than it touches, too
     sample = sampling_time(bench.rows)
     channels = [c for c in CHANNELS if c != driven_channel(bench) or not _ripples(bench)]
     out = []
     for multiple in LAGS:
         lag = multiple * sample
-        if bench.rows.continuous and lag > _OF_STROKE * bench.course.stroke_s:
+        if bench.rows.continuous and lag > _OF_STROKE * bench.load_history.stroke_s:
             break  # the load would have come before anybody turned a screw
         if not bench.data.arm and bench.rows.hold_starts.all() and multiple > _USUAL:
             break  # one reading a step, and that of a step long past
@@ -203,7 +203,7 @@ def _turning_sd(bench: Bench, lag: float) -> float:
     """s by which a lag is uncertain because nobody recorded when the load began to move: between
     two samples, so that it took half a sample more or less. What a lag shows at the first sample of
     a hold is the share of that way which it is late."""
-    half, way = bench.rows.half_sample, unread_way(bench.rows)
+    half, way = bench.rows.half_sample, unread_ramp_duration(bench.rows)
     return 0.0 if way is None else 0.5 * half / max(way, half) * max(lag - half, 0.0)
 
 
@@ -253,7 +253,7 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return [late(bench, c["channel"], kind, c["lag"]) for kind in kinds_of(law)]
 
 
-def _look_closer(word: Word) -> list[Variant]:
+def _look_closer(word: RefinementTarget) -> list[Variant]:
     """Lags about those that were found; of a driven force that lags also with the springs as they
     are, of whose response it shows a part too late."""
     if not shows(word):

@@ -55,8 +55,9 @@ def level_covariance(bench: Bench) -> Array:
 
 
 def alike(setup: Ints, branch: Ints | Flags, load: Array, span: float) -> Array:
-    """(k, k) covariance of what goes wrong at levels: unit variance, `exp(-|dF| / a quarter of the
-    range)`, a path that may have corners; half so between branches, none between setups."""
+    """(k, k) covariance of the imperfection at k levels, of unit variance: an exponential kernel of
+    the load, correlation length NEIGHBOUR of the span (a path that may have corners), half of it
+    between branches and none between setups."""
     near = np.exp(-np.abs(load[:, None] - load) / (NEIGHBOUR * (span or 1.0)))
     branches = np.where(branch[:, None] == branch, 1.0, 0.5)
     return np.asarray(near * branches * (setup[:, None] == setup) + 1e-9 * np.eye(len(load)))

@@ -77,7 +77,7 @@ def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
             batches.append((places, [_stack(engine, tuple(f), k) for f in words.values()]))
         engine.arranged[variants] = _Arranged(
             np.array([number[v] for v in like], dtype=np.intp),
-            np.array([v.log_prior + likelier_there(engine, v) for v in variants]),
+            np.array([v.log_prior + log_prior_of_joint(engine, v) for v in variants]),
             np.log([len(v.scales) for v in number]),
             batches,
         )
@@ -85,11 +85,12 @@ def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
     return found
 
 
-def likelier_there(engine: Engine, v: Variant) -> float:
-    """Nats by which a mechanism of one joint is likelier for being that joint's."""
+def log_prior_of_joint(engine: Engine, v: Variant) -> float:
+    """Log prior (nats) of the joint that a mechanism sits in (`Bench.joint_log_priors`); 0 for what
+    is no mechanism of one joint, and without an arm."""
     if not engine.bench.data.arm or v.joint is None or v.word not in MECHANISMS:
         return 0.0
-    return float(engine.bench.likelier_joints[v.joint])
+    return float(engine.bench.joint_log_priors[v.joint])
 
 
 # Variants of nearby sizes are padded to the same: a few large batches take less time than many.
@@ -176,8 +177,8 @@ def mean_square(engine: Engine, v: Variant) -> Array:
 
 
 def imperfect(variant: Variant) -> Array:
-    """(k,) how imperfect what each coefficient does is, against the laws of mechanisms: what is
-    linear is exact, a spring beside friction as well."""
+    """(k,) imperfection of what each coefficient does, in that of a mechanism: LAW_IMPERFECTION /
+    IMPERFECTION for linear effects and for the spring beside a mechanism (last column), else 1."""
     exact = LAW_IMPERFECTION / IMPERFECTION
     share = np.full(len(variant.columns), exact if variant.word in LINEAR else 1.0)
     if variant.other_springs:

@@ -28,7 +28,7 @@ from identification.arrays import Array
 from identification.gap.evidence.alike import level_columns, level_covariance, run_columns
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import LOG_STEP, STEP
-from identification.gap.evidence.products import Gathered, Some, Weights, White
+from identification.gap.evidence.products import Gathered, SparseColumns, Weights, WhitenedColumns
 from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
 from identification.gap.model.growing import Growing
@@ -243,7 +243,7 @@ class Engine:
         square = np.add.reduceat(length**2, self._runs, axis=1)
         return np.asarray(length / np.sqrt(square[:, self._run])).ravel()
 
-    def _whiten(self, columns: Array) -> White:
+    def _whiten(self, columns: Array) -> WhitenedColumns:
         n, q = self.bench.rows.n, self.bench.layout.q
         white = np.ascontiguousarray(columns.T) / self.sigma
         response, inverse = white[:, :n], self._inverse
@@ -256,9 +256,9 @@ class Engine:
         contrast[size <= 1e-9 * (1 + top)] = 0.0
         holds = len(self._edges)
         joints = [slice(k, k + holds) for k in range(0, q.stop - q.start, holds)]
-        readings = tuple(Some.of(self._apart(white[:, q], joint)) for joint in joints)
+        readings = tuple(SparseColumns.of(self._apart(white[:, q], joint)) for joint in joints)
         even = np.hstack([means, white[:, q.stop :]])
-        return White(even, readings, Some.of(contrast), holds, self._groups)
+        return WhitenedColumns(even, readings, SparseColumns.of(contrast), holds, self._groups)
 
     def _apart(self, white: Array, joint: slice) -> Array:
         """(c, holds) readings of a joint in units of noise; where those of a run have something in
@@ -293,7 +293,7 @@ class Engine:
         log = np.log(each).sum() + np.log1p(more).sum() + np.log(means).sum()
         return np.hstack([each, means]).ravel(), float(log)
 
-    def _common(self, white: White, weights: list[Weights]) -> list[Array]:
+    def _common(self, white: WhitenedColumns, weights: list[Weights]) -> list[Array]:
         """Per set of weights (c, p): products with target, base and repeatable imperfection."""
         first, second = self._first.between(white, weights), self._second.sparsely(white, weights)
         return [np.vstack(both) for both in zip(first, second, strict=True)]

@@ -21,8 +21,8 @@ _POINTS = 25  # of the integral, per part of a step
 
 
 def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
-    """By how many nats the evidence of parts with that energy (mean square, m^2), integrated over
-    the size of imperfection, is above what the levels give for it."""
+    """Log evidence (nats) integrated over the size of the imperfection, minus what the levels of
+    the grid give for it. energy: mean square (m^2) of what the parts do."""
     etas = engine.etas
     joint = log_joints(engine, parts)
     coarse = joint + level_priors(etas, energy)

@@ -43,35 +43,35 @@ class Weights:
 
 
 @dataclass(frozen=True, eq=False)
-class Some:
-    """Few of many columns: at (p,) the place of every column in `values`, 0 (a row of zeros) for
-    those that are not among them; values (1 + k, rows), a column to a row."""
+class SparseColumns:
+    """p columns of which few are not zero. values (1 + k, rows): a row of zeros, then the k that
+    are not, one to a row; at (p,): the row of `values` that holds each column."""
 
     at: NDArray[np.intp]
     values: Array
 
     @classmethod
-    def of(cls, columns: Array) -> Some:
+    def of(cls, columns: Array) -> SparseColumns:
         """Of columns (p, rows), those that are not all zero."""
         kept = np.flatnonzero(np.any(columns != 0, axis=1))
         at = np.zeros(len(columns), dtype=np.intp)
         at[kept] = 1 + np.arange(len(kept))
         return cls(at, np.vstack([np.zeros((1, columns.shape[1])), columns[kept]]))
 
-    def followed(self, parts: Sequence[Some], room: Growing) -> Some:
+    def followed(self, parts: Sequence[SparseColumns], room: Growing) -> SparseColumns:
         """With the columns of all parts after these, whose values are in `room`."""
         starts = np.cumsum([len(self.values) - 1, *(len(p.values) - 1 for p in parts)])
         at = [np.where(p.at == 0, 0, p.at + s) for p, s in zip(parts, starts[:-1], strict=True)]
         room.put(p.values[1:] for p in parts)
-        return Some(np.concatenate([self.at, *at]), room.values)
+        return SparseColumns(np.concatenate([self.at, *at]), room.values)
 
-    def picked(self, columns: NDArray[np.intp]) -> Some:
+    def picked(self, columns: NDArray[np.intp]) -> SparseColumns:
         """Some of all columns (k,)."""
         at = self.at[columns]
         here = np.flatnonzero(at)
         place = np.zeros(len(at), dtype=np.intp)
         place[here] = 1 + np.arange(len(here))
-        return Some(place, self.values[np.append(0, at[here])])
+        return SparseColumns(place, self.values[np.append(0, at[here])])
 
     @property
     def any(self) -> bool:
@@ -104,22 +104,22 @@ def _scaled(thin: csr_matrix, weights: Sequence[Array], other: Array) -> list[Ar
 
 
 @dataclass(frozen=True, eq=False)
-class White:
+class WhitenedColumns:
     """Whitened stacked columns (p): even (p, holds + rest), means of the response per hold and the
     channels without imperfection; q: per joint those that touch its readings; contrast: those
     that vary within holds. holds: how many of `even` are means. groups: of contrasts that are
     weighed alike, all of them or none."""
 
     even: Array
-    q: tuple[Some, ...]
-    contrast: Some
+    q: tuple[SparseColumns, ...]
+    contrast: SparseColumns
     holds: int
     groups: tuple[slice, ...]
 
     def __len__(self) -> int:
         return len(self.even)
 
-    def between(self, columns: White, weights: list[Weights]) -> list[Array]:
+    def between(self, columns: WhitenedColumns, weights: list[Weights]) -> list[Array]:
         """Per set of weights (k, p): products of all these columns with all those of another."""
         means, others = self.even[:, : self.holds], columns.even[:, : self.holds]
         out = _together(means, others, [w.hold for w in weights])
@@ -143,7 +143,7 @@ class White:
     def _of_groups(self, w: Weights) -> Array:
         return w.contrast[[g.start for g in self.groups]]
 
-    def sparsely(self, columns: White, weights: list[Weights]) -> list[Array]:
+    def sparsely(self, columns: WhitenedColumns, weights: list[Weights]) -> list[Array]:
         """The same, where most numbers of these columns are zero."""
         if self._thin is None:
             return self.between(columns, weights)
@@ -164,10 +164,12 @@ class White:
             return None
         return csr_matrix(self.even), csr_matrix(self.contrast.values)
 
-    def picked(self, columns: NDArray[np.intp]) -> White:
+    def picked(self, columns: NDArray[np.intp]) -> WhitenedColumns:
         """Some of these columns (k,)."""
         q = tuple(s.picked(columns) for s in self.q)
-        return White(self.even[columns], q, self.contrast.picked(columns), self.holds, self.groups)
+        return WhitenedColumns(
+            self.even[columns], q, self.contrast.picked(columns), self.holds, self.groups
+        )
 
     def unweighed(self, columns: NDArray[np.intp]) -> Array:
         """(1 + groups, v, k, k): what `squares` is made of that no weight is needed for."""
@@ -197,17 +199,17 @@ class White:
 class Gathered:
     """White columns that more are put after; `white` are those that are there."""
 
-    def __init__(self, white: White) -> None:
+    def __init__(self, white: WhitenedColumns) -> None:
         """white: the first ones."""
         self.white = white
         self._even, self._contrast = Growing(white.even), Growing(white.contrast.values)
         self._q = [Growing(some.values) for some in white.q]
 
-    def put(self, parts: Sequence[White]) -> None:
+    def put(self, parts: Sequence[WhitenedColumns]) -> None:
         """Puts the columns of all parts after those that are there."""
         self._even.put(part.even for part in parts)
         q = zip(self.white.q, zip(*(part.q for part in parts), strict=True), self._q, strict=True)
-        self.white = White(
+        self.white = WhitenedColumns(
             self._even.values,
             tuple(some.followed(each, room) for some, each, room in q),
             self.white.contrast.followed([part.contrast for part in parts], self._contrast),
@@ -216,7 +218,9 @@ class Gathered:
         )
 
 
-def _add(out: list[Array], mine: Some, other: Some, products: list[Array]) -> None:
+def _add(
+    out: list[Array], mine: SparseColumns, other: SparseColumns, products: list[Array]
+) -> None:
     """Adds products (p, k) of what is there of two to each of those of all columns."""
     place = np.ix_(mine.at, other.at)
     for rows, product in zip(out, products, strict=True):
@@ -225,7 +229,7 @@ def _add(out: list[Array], mine: Some, other: Some, products: list[Array]) -> No
 
 def _add_squares(
     out: Array,
-    some: Some,
+    some: SparseColumns,
     columns: NDArray[np.intp],
     rows: slice = slice(None),
     weight: Array | float = 1.0,

@@ -14,6 +14,7 @@ from identification.arrays import Array
 from identification.gap.evidence.compare import Scored, closest, condition, marginal
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.imperfection import level_priors
+from identification.gap.evidence.lognormal_springs import lognormal_prior_correction
 from identification.gap.evidence.parts import (
     Part,
     Sizes,
@@ -24,7 +25,6 @@ from identification.gap.evidence.parts import (
     part_sizes,
     signs_kept,
 )
-from identification.gap.evidence.stiffness import as_stiff_as_stated
 from identification.gap.explanations.penalties import (
     TOE_AND_KNEE,
     below_noise,
@@ -59,7 +59,7 @@ class Explanation:
     log_weight: float
     eta: float
     sizes: tuple[float, ...]
-    log_good: float
+    log_adequate: float
     off: float = nan
 
     def sized(self, sizes: Iterable[float]) -> Explanation:
@@ -73,9 +73,9 @@ class Explanation:
         )
 
     @property
-    def good(self) -> bool:
+    def adequate(self) -> bool:
         """It leaves little enough."""
-        return self.log_good > self.log_weight - log(2)
+        return self.log_adequate > self.log_weight - log(2)
 
     @cached_property
     def words(self) -> frozenset[str]:
@@ -83,7 +83,7 @@ class Explanation:
         return frozenset(p.word for p in self.parts)
 
     @cached_property
-    def troubles(self) -> dict[str, float]:
+    def rms_by_word(self) -> dict[str, float]:
         """Word -> rms m of what it does in all its joints together, the largest first."""
         return _together(self.parts, self.sizes)
 
@@ -105,7 +105,7 @@ PLAIN = 3.0  # nats that a shape must explain the gap better than anything else,
 
 
 @dataclass(frozen=True)
-class Likeness:
+class GapPattern:
     """What an unknown gap looks like. kind: slopes, swings, waves, rough, jumps or settles; of a
     recording that runs on jerks, damage, softening, wanders or slopes; period: s of a swing, m of
     a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change within runs
@@ -119,30 +119,29 @@ class Likeness:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What the search found: explanations (best first), evidence of the words alone (nats, against
-    none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
-    gap that no law explains, what share of its weight withheld data leave an explanation, and what
-    a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
-    that no word names, best first. speakers: words of an explanation -> the one that speaks for it:
-    fewer of its effects that foretell withheld data better, a play in a curve's place, or springs
-    or gains that are off by more than it does. variants: all that were compared, those that were
-    made on the way with them."""
+    """What the search found, and what is thought of it since."""
 
     engine: Engine
-    explanations: tuple[Explanation, ...]
-    alone: dict[str, float]
-    probabilities: dict[str, float]
-    unknown: float
-    unknown_eta: float
+    explanations: tuple[Explanation, ...]  # best first
+    alone: dict[str, float]  # word -> log evidence by itself against `none`, nats
+    probabilities: dict[str, float]  # of all words, `none` and `unknown`
+    unknown: float  # log weight of a gap that no law explains
+    unknown_eta: float  # m: its imperfection
+    # words of an explanation -> share of its weight that withheld data leave it
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)
-    looks_like: Likeness | None = None
-    nameless: tuple[Explanation, ...] = ()
-    speakers: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
-    variants: tuple[Variant, ...] = ()
+    # what a gap that no law explains looks like, if like anything
+    looks_like: GapPattern | None = None
+    # explanations with a trouble that no word names, best first
+    unmodelled: tuple[Explanation, ...] = ()
+    # words of an explanation -> the simpler one that represents it in the verdict: fewer of
+    # its effects that foretell withheld data better, a play in a curve's place, or springs or
+    # gains that are off by more than it does
+    representatives: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
+    variants: tuple[Variant, ...] = ()  # all that were compared, those made on the way with them
 
-    def speaker_for(self, explanation: Explanation | None) -> Explanation | None:
+    def representative_of(self, explanation: Explanation | None) -> Explanation | None:
         """Who speaks for an explanation, if anybody does."""
-        return None if explanation is None else self.speakers.get(explanation.words)
+        return None if explanation is None else self.representatives.get(explanation.words)
 
 
 def explain(
@@ -159,21 +158,21 @@ def explain(
     together = _together(parts, each)
     logs = bases + level_priors(engine.etas, energy)
     best = int(logs.argmax())
-    remainder = may_remain(engine, together)
+    remainder = tolerated_residual(engine, together)
     least = max(
         0.6 * engine.bench.noise.stated,
         remainder / max(len(together), 1),
         min(LAW_REMAINDER * float(each.max(initial=0.0)), remainder),
     )
     share = np.exp(logs - logs.max())
-    good = sum(s * kept_within(lv.eta, least) for s, lv in zip(share, levels, strict=True))
+    good = sum(s * soft_limit(lv.eta, least) for s, lv in zip(share, levels, strict=True))
     fraction = float(good / share.sum())
     order = _order(parts, each)
     if taken is not None:
         log_evidence += evidence_correction(engine, parts, taken, bases)
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= below_noise(engine, parts, sizes) + unbent_curves(engine, parts, sizes)
-    weight += as_stiff_as_stated(engine, parts, best) - within_stated(engine, parts, sizes)
+    weight += lognormal_prior_correction(engine, parts, best) - within_stated(engine, parts, sizes)
     if len(parts) > 1:
         weight -= sum(p.variant.cost for p in parts[:-1])
         weight -= minor_parts(engine, parts, sizes) + cancelling(engine, parts, sizes, each)
@@ -201,19 +200,19 @@ def joined(
     return explain(engine, parts, marginal(scored) - charge, taken)
 
 
-def may_remain(engine: Engine, troubles: Mapping[str, float]) -> float:
-    """rms m of the gap that an explanation by one effect may leave: a share of what springs leave;
-    of a rig without an arm whose spring or gain is off by more than that (troubles: word -> rms m,
-    the largest first), of what that does."""
+def tolerated_residual(engine: Engine, troubles: Mapping[str, float]) -> float:
+    """Tolerated rms (m) of the residual of an explanation by one effect: REMAINDER of what springs
+    leave. Of a rig without an arm OF_A_BENCH of that, or of its largest effect where that is a
+    spring or a gain and larger. troubles: word -> rms m, the largest first."""
     if engine.bench.data.arm:
         return REMAINDER * engine.structural
     word, size = next(iter(troubles.items()), ("", 0.0))
     return OF_A_BENCH * max(engine.structural, size if word in LINEAR else 0.0)
 
 
-def kept_within(value: float, limit: float) -> float:
-    """Share of its weight that what is judged by a value keeps: all far within the limit, half of
-    it there, and ever less beyond."""
+def soft_limit(value: float, limit: float) -> float:
+    """1 / (1 + (value / limit)^8): about 1 below the limit, half at it, next to nothing beyond. The
+    weight of an explanation is multiplied by it."""
     return float(1 / (1 + (value / limit) ** _SOFT))
 
 
@@ -255,7 +254,7 @@ def _leading_of_two(
         return rubs
     curves, creeps = any(w in CURVES for w in words), "joint_creep" in words
     late = creeps or ("time_lag" in words and sizes[rubs] > _OF_A_LAG * sizes.max())
-    if (curves and bench.course.stays > _STAYS) or (late and bench.course.one_rate):
+    if (curves and bench.load_history.stays > _STAYS) or (late and bench.load_history.one_rate):
         return rubs
     return int(needed(engine, parts, level).argmax()) if creeps and bench.imposed else None
 
@@ -268,7 +267,7 @@ def _walks(bench: Bench) -> bool:
     """Whether the response to a driven force that goes to and fro walks the way of its mean."""
     load, n = bench.load, bench.rows.n
     mean, third = (float(load.max()) + float(load.min())) / 2, n // 3
-    if bench.imposed or bench.course.passes < _CYCLES or abs(mean) < _ASIDE * np.ptp(load):
+    if bench.imposed or bench.load_history.passes < _CYCLES or abs(mean) < _ASIDE * np.ptp(load):
         return False
     left = bench.response - bench.slope * load
     return bool((left[-third:].mean() - left[:third].mean()) * mean > 0)

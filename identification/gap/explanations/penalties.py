@@ -17,8 +17,8 @@ from identification.gap.words import (
     LATE,
     LINEAR,
     MECHANISMS,
-    NAMELESS,
     SPRINGS,
+    UNMODELLED,
 )
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
@@ -219,19 +219,19 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
         return False
     same = bool(set(one.variant.joints) & set(other.variant.joints))
     words = {one.word, other.word}
-    holds = "joint_creep" in words and not engine.bench.course.always_moves
+    holds = "joint_creep" in words and not engine.bench.load_history.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
-    hidden = bench.course.once or not (bench.data.arm or bench.course.returns)
+    hidden = bench.load_history.monotonic or not (bench.data.arm or bench.load_history.returns)
     # but what gets stiffer at the start and softer in the end is two things
     if hidden and words <= MECHANISMS and not holds and words != TOE_AND_KNEE:
         return True
-    if bench.course.never_held and "time_lag" in words and words & MECHANISMS:
+    if bench.load_history.never_held and "time_lag" in words and words & MECHANISMS:
         return True  # of a single pull: what comes late and what bends are one curve
     if not engine.bench.data.arm and words == LATE and _as_late(one, other):
         return True
-    if engine.bench.course.rests and words <= DRIFTS:
+    if engine.bench.load_history.rests and words <= DRIFTS:
         return True  # what is read beside a load that stands is one path in time
-    bends = MECHANISMS | frozenset(NAMELESS) - {JERKS}
+    bends = MECHANISMS | frozenset(UNMODELLED) - {JERKS}
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & bends)):
         return True
     springs = SPRINGS in words and words & MECHANISMS

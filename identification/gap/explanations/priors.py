@@ -12,8 +12,8 @@ from math import comb, exp, log
 from typing import NamedTuple
 
 from identification.gap.model.bench import Bench
-from identification.gap.recording.course import Course
-from identification.gap.words import CURVES, NAMELESS, WORDS
+from identification.gap.recording.load_history import LoadHistory
+from identification.gap.words import CURVES, UNMODELLED, WORDS
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 # Of a table that shows a curve of the load, and nothing else: that has a word, whatever its form.
@@ -25,7 +25,7 @@ LOG_MORE = log(0.05)
 LOG_RARE = {"base_slip": log(0.5)}
 
 
-def log_unknown(course: Course) -> float:
+def log_unknown(course: LoadHistory) -> float:
     """Of what no word names, whatever its shape."""
     return LOG_UNKNOWN_CURVE if course.only_a_curve else LOG_UNKNOWN
 
@@ -37,7 +37,7 @@ class Rarer(NamedTuple):
     nats: float
     words: frozenset[str]
     without: frozenset[str]
-    where: Callable[[Course], bool]
+    where: Callable[[LoadHistory], bool]
 
 
 _HYSTERESIS, _YIELD = frozenset({"joint_hysteresis"}), frozenset({"joint_yield"})
@@ -47,7 +47,7 @@ _ANY, _NO_WORD = frozenset(WORDS), frozenset[str]()
 # Evidence of running recordings is tempered: 10 nats there are odds of about 3, 20 of 10, 30 of 40.
 RARER = (
     # Friction that was never seen to make a loop.
-    Rarer(log(0.05), _HYSTERESIS, _NO_WORD, lambda c: c.once),
+    Rarer(log(0.05), _HYSTERESIS, _NO_WORD, lambda c: c.monotonic),
     # A force that drifts, made up for by a load that goes the other way.
     Rarer(-30.0, frozenset({"force_drift"}), _NO_WORD, lambda c: c.turns_alike),
     # A target that warms up while it is held in place.
@@ -78,9 +78,9 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
         return LOG_NONE
     rare = sum(LOG_RARE.get(w, 0.0) for w in words)
     if bench is not None:
-        rare += _of_course(words, bench.course) + _by_calibration(words, bench)
-    named = words - frozenset(NAMELESS)
-    first = LOG_ONE if named == words else LOG_UNKNOWN + LOG_SHAPED - log(len(NAMELESS))
+        rare += _of_course(words, bench.load_history) + _by_calibration(words, bench)
+    named = words - frozenset(UNMODELLED)
+    first = LOG_ONE if named == words else LOG_UNKNOWN + LOG_SHAPED - log(len(UNMODELLED))
     return first + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(named))) + rare
 
 
@@ -93,7 +93,7 @@ def before_data(words: Collection[str]) -> dict[str, float]:
     return {w: exp(logs[w]) / total if w in logs else 0.0 for w in [*WORDS, "none", "unknown"]}
 
 
-def _of_course(words: frozenset[str], course: Course) -> float:
+def _of_course(words: frozenset[str], course: LoadHistory) -> float:
     return sum(
         r.nats for r in RARER if words & r.words and not words & r.without and r.where(course)
     )

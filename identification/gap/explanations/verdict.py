@@ -23,10 +23,10 @@ TEMPER = 0.12
 DOUBT, BENCH_DOUBT = 0.03, 0.2
 
 
-def trusted(probabilities: dict[str, float], doubted: set[str], most: float) -> dict[str, float]:
-    """Probabilities in which a doubted word that is likelier than not gives up to `most` of its own
-    away, the more the surer it is; half of that goes to `unknown`, half to all doubted words
-    alike."""
+def discounted(probabilities: dict[str, float], doubted: set[str], most: float) -> dict[str, float]:
+    """Probabilities discounted for overconfidence. A doubted word of p > 0.5 loses `most` p (2 p -
+    1): half of that goes to `unknown`, half in equal parts to all doubted words. The sum stays 1.
+    """
     given = {w: p for w, p in probabilities.items() if w in doubted}
     lost = {w: _given_away(p, most) for w, p in given.items()}
     out = {w: p - lost.get(w, 0.0) for w, p in probabilities.items()}
@@ -46,34 +46,35 @@ def _given_away(probability: float, most: float) -> float:
 def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) -> SearchResult:
     """The result with the probability of every word to be the main cause, of `none` and `unknown`.
 
-    Every explanation gives its weight to its main effect, as far as it explains the gap (`good`)
-    and foretold withheld data. kept: words of an explanation -> share of its weight that it keeps
-    there. The rest goes to its heir: the best explanation with fewer of the same effects, else
-    `unknown`. What three effects say on an arm keeps a share (`THREE`); running recordings have
-    fewer independent rows than samples (`TEMPER`); `trusted` takes off what no posterior knows.
+    Every explanation gives its weight to its main effect, as far as it explains the gap
+    (`adequate`) and foretold withheld data. kept: words of an explanation -> share of its weight
+    that it keeps there. The rest goes to its heir: the best explanation with fewer of the same
+    effects, else `unknown`. What three effects say on an arm keeps a share (`THREE`); running
+    recordings have fewer independent rows than samples (`TEMPER`); `discounted` takes off what no
+    posterior knows.
     """
     ranked = found.explanations
     explained = _explained(found, kept)
     unknown = min(found.unknown, explained)
-    nameless = found.nameless if explained == np.inf else ()
-    top = max(unknown, *(e.log_weight for e in (*ranked[:1], *nameless[:1])))
+    unmodelled = found.unmodelled if explained == np.inf else ()
+    top = max(unknown, *(e.log_weight for e in (*ranked[:1], *unmodelled[:1])))
     mass = dict.fromkeys([*WORDS, "none", "unknown"], 0.0)
     mass["unknown"] = float(np.exp(unknown - top))
     arm = found.engine.bench.data.arm
-    for e in (*ranked, *nameless):
-        whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
+    for e in (*ranked, *unmodelled):
+        whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_adequate - top))
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
         fewer = _simplest_of(e, ranked, kept, arm=arm)
-        said = found.speaker_for(e) or found.speaker_for(fewer) or fewer or e
+        said = found.representative_of(e) or found.representative_of(fewer) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         three = arm and _tells_of_three(said, ranked)
         many = (THREE_CLOSELY if closely else THREE) if three else 1.0
         for word, share in _mains(e, fewer, said, ranked, kept, arm=arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
-        heir = _heir(e, ranked, kept, may_miss(found.engine))
+        heir = _heir(e, ranked, kept, tolerated_misfit(found.engine))
         for word, share in (_main(heir, ranked, arm) if heir else {"unknown": 1.0}).items():
             mass[word] += share * (whole - good)
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
@@ -82,7 +83,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
     doubted, doubt = set(found.alone), DOUBT
     if not found.engine.bench.data.arm:
         doubted, doubt = doubted | {"none", "unknown"}, BENCH_DOUBT
-    probabilities = trusted({w: m / total for w, m in mass.items()}, doubted, doubt)
+    probabilities = discounted({w: m / total for w, m in mass.items()}, doubted, doubt)
     best = next((e for e in ranked if e.parts), None)
     if arm and best is not None:
         probabilities = with_a_lead(probabilities, _main(best, ranked, arm))
@@ -106,12 +107,12 @@ def with_a_lead(probabilities: dict[str, float], best: Mapping[str, float]) -> d
     return out
 
 
-def foresaw(kept: Mapping[frozenset[str], float], words: frozenset[str]) -> bool:
+def passed_validation(kept: Mapping[frozenset[str], float], words: frozenset[str]) -> bool:
     """Whether an explanation with these words foretold withheld data, or nobody looked."""
-    return kept.get(words, 1.0) > FORESAW
+    return kept.get(words, 1.0) > PASSES_ABOVE
 
 
-FORESAW = 0.5  # of its weight is kept
+PASSES_ABOVE = 0.5  # of its weight is kept
 
 
 def _explained(found: SearchResult, kept: Mapping[frozenset[str], float]) -> float:
@@ -123,13 +124,13 @@ def _explained(found: SearchResult, kept: Mapping[frozenset[str], float]) -> flo
     if bench.data.arm:
         return np.inf
     laws = (
-        e.log_good - EXPLAINED
+        e.log_adequate - EXPLAINED
         for e in found.explanations
         if e.parts
         and not any(p.variant.free_pieces for p in e.parts)
-        and e.good
+        and e.adequate
         and e.eta <= (1.0 if bench.noise.sure else UNSURE) * bench.noise.stated
-        and foresaw(kept, e.words)
+        and passed_validation(kept, e.words)
     )
     return next(laws, np.inf)
 
@@ -180,9 +181,9 @@ def simpler_of(
         if len(f.words) == many - 1
         and f.words < e.words
         and f.log_weight > e.log_weight - most
-        and f.good
+        and f.adequate
         and not f.off >= ARM_AS_STATED
-        and foresaw(kept, f.words)
+        and passed_validation(kept, f.words)
     )
     return next(near, None)
 
@@ -190,13 +191,13 @@ def simpler_of(
 _TWO, _MANY = 2, 3
 
 
-def speaker_of(
+def find_representative(
     found: SearchResult, explanation: Explanation, kept: Mapping[frozenset[str], float]
 ) -> Explanation | None:
     """Who speaks for an explanation that is no simpler one of the same effects, if anybody does."""
     arm, ranked = found.engine.bench.data.arm, found.explanations
     fewer = _simplest_of(explanation, ranked, kept, arm=arm)
-    speaker = found.speaker_for(explanation) or found.speaker_for(fewer)
+    speaker = found.representative_of(explanation) or found.representative_of(fewer)
     if speaker is not None or not arm or fewer is None or len(fewer.words) > 1:
         return speaker
     first = next(iter(_alone(ranked, kept)), fewer)
@@ -222,7 +223,12 @@ def _alone(
 ) -> Iterator[Explanation]:
     """Single effects that explain enough, the likeliest first."""
     for e in ranked:
-        if len(e.words) == 1 and e.good and not e.off >= ARM_AS_STATED and foresaw(kept, e.words):
+        if (
+            len(e.words) == 1
+            and e.adequate
+            and not e.off >= ARM_AS_STATED
+            and passed_validation(kept, e.words)
+        ):
             yield e
 
 
@@ -274,7 +280,7 @@ def troubles_named(explanation: Explanation, ranked: Sequence[Explanation]) -> d
     """Word -> rms m of what it does. A play and a curve of one joint are one trouble: flanks are
     curved, and where one leaves something the other one mends it. Which does more beside the other
     says nothing; it is called by the one that explains more without the other."""
-    sizes = dict(explanation.troubles)
+    sizes = dict(explanation.rms_by_word)
     if not flanks_of_one_joint(explanation):
         return sizes
     alone = {w: _best_of(explanation.words - (FLANKS - {w}), ranked) for w in FLANKS}
@@ -348,7 +354,7 @@ def _heir(
     best one with fewer of the same effects that explains enough for itself, if any. closely:
     imperfection m below which it does so however much less likely it is."""
     able = (e for e in ranked if may_inherit(e, explanation, closely))
-    return next((e for e in able if e.good and foresaw(kept, e.words)), None)
+    return next((e for e in able if e.adequate and passed_validation(kept, e.words)), None)
 
 
 def may_inherit(heir: Explanation, explanation: Explanation, closely: float) -> bool:
@@ -358,7 +364,7 @@ def may_inherit(heir: Explanation, explanation: Explanation, closely: float) -> 
     return bool(heir.parts) and heir.words < explanation.words and near
 
 
-def may_miss(engine: Engine) -> float:
+def tolerated_misfit(engine: Engine) -> float:
     """m that a law may miss, and explains the gap all the same."""
     return max(_CLOSELY * engine.bench.noise.stated, _MOSTLY * engine.structural)
 

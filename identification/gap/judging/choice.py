@@ -1,4 +1,5 @@
-"""Which explanation is shown for a verdict: no effect more than earns its name."""
+"""Which explanation is shown for a verdict: no effect that does not earn its name, and the simpler
+explanation that represents it where the verdict leads there."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.explanations.verdict import (
     AS_STATED,
     FLANKS,
-    FORESAW,
+    PASSES_ABOVE,
     TAKES_TWO,
     flanks_of_one_joint,
     simpler_of,
@@ -57,9 +58,9 @@ def chosen_of(found: SearchResult, verdict: str) -> Choice:
         return Choice(next(e for e in found.explanations if not e.parts))
     mine = [e for e in found.explanations if verdict in e.words]
     mine = [e for e in mine if not _needless(found, e)] or mine
-    held = [e for e in mine if foresees(found, e)]
-    best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
-    simpler = [e for e in held if e.good and e.words < best.words]
+    held = [e for e in mine if passes_validation(found, e)]
+    best = next((e for e in [*held, *mine] if e.adequate), [*held, *mine][0])
+    simpler = [e for e in held if e.adequate and e.words < best.words]
     best = _worthwhile(best, simpler, arm=found.engine.bench.data.arm)
     shown = _without_small(found.engine, best, simpler)
     shown = _as_it_speaks(found, shown, verdict)
@@ -70,10 +71,10 @@ def _as_it_speaks(found: SearchResult, shown: Explanation, verdict: str) -> Expl
     """Of an arm: without the effect that would be larger than the verdict, where what is left
     speaks for both: so many nats may be how far its laws are off, and then it has no size of its
     own. Not where springs and gains stand for it: then it has."""
-    if not found.engine.bench.data.arm or next(iter(shown.troubles)) == verdict:
+    if not found.engine.bench.data.arm or next(iter(shown.rms_by_word)) == verdict:
         return shown
     fewer = simpler_of(shown, found.explanations, found.kept, arm=True)
-    if fewer is None or not fewer.off < AS_STATED or next(iter(fewer.troubles)) != verdict:
+    if fewer is None or not fewer.off < AS_STATED or next(iter(fewer.rms_by_word)) != verdict:
         return shown
     return fewer
 
@@ -105,7 +106,7 @@ def _too_small(explanation: Explanation) -> list[str]:
     """Effects that may be how far the law of another one is off, the smallest first. Only linear
     ones may be what other linear ones lack: no such law bends. A jump of the datum shows without
     load, where no law but a drift's is off; and it has no law that could be off under load."""
-    sizes = explanation.troubles
+    sizes = explanation.rms_by_word
     share = LEAST_SHARE if len(sizes) <= _TWO else LEAST_OF_THIRD
     out = []
     for word, size in sorted(sizes.items(), key=lambda i: i[1]):
@@ -120,7 +121,7 @@ def _too_small(explanation: Explanation) -> list[str]:
 
 def _needless(found: SearchResult, explanation: Explanation) -> bool:
     """Whether another explanation speaks for it; for what drifts, which nothing foretells, none."""
-    simpler = found.speaker_for(explanation)
+    simpler = found.representative_of(explanation)
     return simpler is not None and not (explanation.words - simpler.words) & BETWEEN_RUNS
 
 
@@ -141,10 +142,10 @@ def _worth(explanation: Explanation, fewer: Explanation, *, arm: bool) -> float:
     return WORTH if len(explanation.words) <= _TWO else WORTH_OF_THIRD
 
 
-def foresees(found: SearchResult, explanation: Explanation) -> bool:
+def passes_validation(found: SearchResult, explanation: Explanation) -> bool:
     """Whether it foresees withheld repetitions; where nobody looked, whether nothing that failed is
     contained in it: what is added to a failure does not mend it."""
     kept = found.kept.get(explanation.words)
     if kept is not None:
-        return kept > FORESAW
-    return not any(k <= FORESAW and w <= explanation.words for w, k in found.kept.items())
+        return kept > PASSES_ABOVE
+    return not any(k <= PASSES_ABOVE and w <= explanation.words for w, k in found.kept.items())

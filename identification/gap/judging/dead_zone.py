@@ -23,7 +23,7 @@ from identification.gap.model.bench import Bench
 PLAY, CURVE = "joint_backlash", "joint_nonlinear_stiffness"
 
 
-class Limits(NamedTuple):
+class DeadZoneCriteria(NamedTuple):
     """Of a play: stiffness within it, of that of the flanks; way from loose to stiff, of it; how
     much stiffer flanks may get towards the ends of the way."""
 
@@ -35,7 +35,7 @@ class Limits(NamedTuple):
 # To say play although a curve is likelier; to say it where that is the likelier one, as it is of
 # few curves: what hardens as fast as a cubic spring passes. Tissue hardens ever more, as exp(u),
 # and leaves its soft middle fast; teeth that are pressed together get stiffer by less (Hertz 1881).
-PLAINLY, SOMEHOW = Limits(0.2, 0.2, 1.75), Limits(0.3, 0.35, np.inf)
+PLAINLY, SOMEHOW = DeadZoneCriteria(0.2, 0.2, 1.75), DeadZoneCriteria(0.3, 0.35, np.inf)
 _POINTS = 400  # over the way of the displacement
 _STIFF, _STIFFEST = 0.75, 0.95  # quantiles of the stiffness: that of the flanks; at their ends
 _SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them, and across a step
@@ -54,7 +54,7 @@ def spoken_for(
     if not best.parts or best.parts[0].word not in FLANKS:
         return {}
     load = bench.load[where_it_sits(bench, best)]
-    if bench.course.one_sided or len(_distinct(np.sort(load), load)[0]) < _FEWEST:
+    if bench.load_history.one_sided or len(_distinct(np.sort(load), load)[0]) < _FEWEST:
         return {}
     rest, word = best.words - FLANKS, best.parts[0].word
     others = {min(e.words & FLANKS): e for e in ranked if _is_one_beside(e, rest)}
@@ -98,7 +98,7 @@ def where_it_sits(bench: Bench, explanation: Explanation) -> Flags:
     return everywhere if joint is None else np.asarray(bench.lever[:, joint] != 0)
 
 
-def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:
+def has_dead_zone(u: Array, force: Array, limits: DeadZoneCriteria) -> bool:
     """Whether force (n,) over displacement u (n,) has a dead zone with sharp ends, inside. None of
     what has no stiff flanks."""
     share = _stiffness(u, force)
@@ -179,7 +179,7 @@ def _stretches(inside: Flags) -> list[tuple[int, int]]:
     return list(pairwise(edges.tolist()))[::2]
 
 
-def _is_play(share: Array, a: int, b: int, limits: Limits) -> bool:
+def _is_play(share: Array, a: int, b: int, limits: DeadZoneCriteria) -> bool:
     """Whether the stretch from a to b of stiffness, as a share of that of the flanks, is loose
     within and stiff again soon on both sides."""
     width = b - a

@@ -7,7 +7,8 @@ of a withheld run stay in: they carry its datum (of the laser, and of a drift), 
 know; as do the forces that it was pushed across with. The datum of a withheld direction, of a laser
 that is zeroed before each run, or of a run that was never read without load is taken from its own
 mean: what is left after is less that, as no model knows it. Before is the simulation as given.
-Holds that tell themselves that the load went beyond them before (`search.unseen`) are not judged.
+Holds that tell themselves that the load went beyond them before (`search.overshoots`) are not
+judged.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ def but_lags(engine: Engine, ranked: Sequence[Explanation]) -> list[Explanation]
     """Of explanations of a rig without an arm, the best first, those by a creep that is but a lag,
     as far as they are likelier than the lag."""
     noise = engine.bench.noise.stated
-    lag = next((e for e in ranked if e.words == {_LAG} and e.good and e.eta <= noise), None)
+    lag = next((e for e in ranked if e.words == {_LAG} and e.adequate and e.eta <= noise), None)
     if lag is None:
         return []
     creeps = (e for e in ranked if _CREEP in e.words and _LAG not in e.words)

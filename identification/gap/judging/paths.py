@@ -24,7 +24,7 @@ FASTEST = 400e-6 / 60  # m/s
 BACK_WITHIN_S, BACK = 200.0, 0.6
 
 
-def goes_as_no_drift(engine: Engine, fitted: Fit) -> bool:
+def is_implausible_drift(engine: Engine, fitted: Fit) -> bool:
     """Whether a drift of a fit swings, hurries or turns back at once."""
     return _swings(fitted) or _hurries(engine, fitted) or _turns_back(engine, fitted)
 
@@ -88,7 +88,7 @@ def there_and_back(way: Array, time: Array) -> float:
 
 def _step(engine: Engine, path: Array) -> float:
     """Time (s) between the pieces of a path."""
-    return engine.bench.course.session_span / (len(path) - 1)
+    return engine.bench.load_history.session_span / (len(path) - 1)
 
 
 def _free_paths(fitted: Fit, words: frozenset[str]) -> Iterator[Array]:

@@ -62,19 +62,19 @@ def led_by_springs(found: SearchResult, near: Sequence[Explanation]) -> SearchRe
     """
     engine, ranked = found.engine, {e.words: e for e in found.explanations}
     ranked |= {e.words: _led(engine, e) for e in near if len(e.words) > 1 and e.words & LINEAR}
-    linear = [e for e in found.explanations if e.good and e.words and e.words <= LINEAR]
+    linear = [e for e in found.explanations if e.adequate and e.words and e.words <= LINEAR]
     heirs = [e for e in linear if e.log_weight > linear[0].log_weight - _AS_GOOD]
-    speakers = dict(found.speakers)
+    representatives = dict(found.representatives)
     for e in near:
         if not heirs or not e.parts or e.words & LINEAR or not off_from_stated(engine, e):
             continue
-        speakers[e.words] = heirs[0]
+        representatives[e.words] = heirs[0]
         for both in (_beside(engine, found.variants, heir, e) for heir in heirs):
             known = ranked.get(both.words)
             if known is None or known.log_weight < both.log_weight:
                 ranked[both.words] = both
     best_first = tuple(sorted(ranked.values(), key=lambda e: -e.log_weight))
-    return replace(found, explanations=best_first, speakers=speakers)
+    return replace(found, explanations=best_first, representatives=representatives)
 
 
 def _led(engine: Engine, explanation: Explanation) -> Explanation:

@@ -25,7 +25,7 @@ WINDOW = 12.0  # nats above `none` that a word must have to be refined
 
 
 @dataclass(frozen=True, eq=False)
-class Word:
+class RefinementTarget:
     """A word that stands out: its variants alone, and beside the leading word, best first; ranked:
     the leading words, whose scores are families."""
 
@@ -41,17 +41,17 @@ class Word:
         return self.alone[0].variant.word
 
 
-def shows(word: Word) -> bool:
+def shows(word: RefinementTarget) -> bool:
     """Whether it is worth closer looks."""
     return seen(word) or nearly_leads(word)
 
 
-def seen(word: Word) -> bool:
+def seen(word: RefinementTarget) -> bool:
     """Whether it explains something beside the leading word, or is that."""
     return not word.beside or word.beside[0].log_evidence > _lead(word) + WINDOW
 
 
-def nearly_leads(word: Word) -> bool:
+def nearly_leads(word: RefinementTarget) -> bool:
     """Whether it explains alone nearly as much as the leading word does."""
     none = max(level.log_base for level in word.engine.levels)
     mine, first = (marginal(word.families[n]) - none for n in (word.name, word.ranked[0]))
@@ -61,22 +61,23 @@ def nearly_leads(word: Word) -> bool:
 _NEARLY = 0.7  # of what the leading word brings, nats above `none`
 
 
-def _lead(word: Word) -> float:
+def _lead(word: RefinementTarget) -> float:
     return closest(word.families[word.ranked[0]]).log_evidence
 
 
 def closing_in(
-    word: Word,
+    word: RefinementTarget,
     refined: Callable[..., list[Variant]],
     starts: list[Scored],
     closer: tuple[float, ...] = (_CLOSE,),
     *,
     to_the_last: bool = False,
 ) -> list[Variant]:
-    """Finer shapes about those that were found, and finer ones still about the best of these. What
-    is best moves along narrow valleys (a zone is as wide as the crossing is far): every look but
-    the closest is moved after it until it stays, and the last one is kept. What was seen to be far
-    worse is left out; the last look is scored for this only if asked `to_the_last`."""
+    """Iterative refinement of the grid about what was found: `refined` gives a variant's
+    neighbours, the finer the smaller their share of a step. What is best moves along narrow valleys
+    (a zone is as wide as its crossing is far), so each grid but the finest is moved after the best
+    variant until that stays. Returns the variants that were tried but those far worse; the last
+    grid is scored for this only with `to_the_last`."""
     engine = word.engine
     fresh = [v for s in starts for v in refined(engine.bench, s.variant)]
     finer, found = list(fresh), list[Scored]()
@@ -96,7 +97,7 @@ def closing_in(
     return [v for v in finer if v not in far]
 
 
-def scored(word: Word, family: list[Variant]) -> list[Scored]:
+def scored(word: RefinementTarget, family: list[Variant]) -> list[Scored]:
     """Scores of some of its variants: beside the leading word, where it explains something there;
     of a rival of that, which explains the same, alone."""
     if not seen(word):
@@ -168,7 +169,7 @@ def places(
     return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]
 
 
-def best_about_springs(laws: Laws, word: Word) -> list[Variant]:
+def best_about_springs(laws: Laws, word: RefinementTarget) -> list[Variant]:
     """The best alone and beside the leading word, with the springs as they are."""
     best = dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s)
     return [about_springs(laws, word.engine, v) for v in best]

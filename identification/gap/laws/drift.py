@@ -11,7 +11,7 @@ from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import followed
 from identification.gap.model.variants import WARMS_UP, Variant, variant
-from identification.gap.recording.turns import way_back
+from identification.gap.recording.turns import largest_reversal
 from identification.gap.recording.white import white_sd
 from identification.turns import turning_points
 
@@ -43,7 +43,7 @@ def rates(bench: Bench) -> list[Array]:
 def _clock(bench: Bench) -> Array:
     """(n,) 0 to 1: share of the session that is over."""
     session = bench.rows.session
-    return np.asarray((session - session.min()) / bench.course.session_span)
+    return np.asarray((session - session.min()) / bench.load_history.session_span)
 
 
 def by_direction(bench: Bench) -> dict[str, Array]:
@@ -62,7 +62,7 @@ def own_clock(bench: Bench) -> bool:
     """
     if hangs(bench) and not (_goes_back(bench.response) or _against_it(bench)):
         return False
-    if bench.course.passes >= 3:
+    if bench.load_history.passes >= 3:
         return True
     # a screw that relaxes, and is put right, takes the springs to and fro
     alone = bench.response - bench.slope * bench.load
@@ -104,7 +104,7 @@ def waited(bench: Bench) -> Flags:
 
 def hangs(bench: Bench) -> bool:
     """Whether a load stood all the time, from before anybody looked."""
-    return bench.course.stands and _loaded(bench)
+    return bench.load_history.stands and _loaded(bench)
 
 
 def _goes_back(read: Array) -> bool:
@@ -127,7 +127,7 @@ def _goes_back(read: Array) -> bool:
 
 def _back(path: Array) -> float:
     """How far a path (n,) goes back, whichever way it went."""
-    return min(way_back(path * sign) for sign in (1.0, -1.0))
+    return min(largest_reversal(path * sign) for sign in (1.0, -1.0))
 
 
 _STRETCHES, _OF_EACH = 100, 4  # pieces at most; rows of each at least
@@ -157,7 +157,7 @@ def shares(bench: Bench, usual: tuple[float, ...], path: Array | None = None) ->
     if not bench.rows.continuous:
         return usual
     steep = (1.0, 3.0, 10.0) if _resting_pieces(bench) > RESTING_PIECES else (1.0, 3.0)
-    return (*(s for s in usual if s < 0.3), 0.3, *(steep if bench.course.rests else ()))
+    return (*(s for s in usual if s < 0.3), 0.3, *(steep if bench.load_history.rests else ()))
 
 
 _LOADED = 0.3  # of the largest force
@@ -202,8 +202,8 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
             label: FreePath(max(pieces, most * (label == WINDING)))
             for label, pieces in PIECES.items()
         }
-    most = _resting_pieces(bench) if bench.course.rests else LONG_PIECES
-    pieces = min(3 * (bench.course.passes - 3), most)
+    most = _resting_pieces(bench) if bench.load_history.rests else LONG_PIECES
+    pieces = min(3 * (bench.load_history.passes - 3), most)
     if pieces < LEAST_PIECES:
         return {}
     return {"free path": FreePath(pieces), "steady path": FreePath(pieces, True)}
@@ -211,7 +211,7 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
 
 def _resting_pieces(bench: Bench) -> int:
     """Pieces of a path while nothing is loaded anew: of hours, in which a room swings, more."""
-    slow = int(min(bench.course.session_span / _ROOM_S, bench.rows.n / _OF_EACH))
+    slow = int(min(bench.load_history.session_span / _ROOM_S, bench.rows.n / _OF_EACH))
     return min(max(RESTING_PIECES, slow), MOST_PIECES)
 
 

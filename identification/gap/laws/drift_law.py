@@ -17,7 +17,7 @@ OF_SESSION = ("drift_knot", "drift_per_kelvin")  # coefficients of paths without
 def law_of_path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term, ...], Array]:
     """Constants, k terms and scales (k,) of a path of the library, in seconds and kelvin: what a
     coefficient of the variant is times its scale is the term's coefficient."""
-    span, label = bench.course.session_span, str(v.info["path"])
+    span, label = bench.load_history.session_span, str(v.info["path"])
     if label == "linear":
         return {"path": "linear"}, (Term("drift_rate"),), np.array([1 / span])
     if label == "root":

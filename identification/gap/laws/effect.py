@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from identification.gap.laws.closer import Word
+from identification.gap.laws.closer import RefinementTarget
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Laws
 from identification.gap.model.bench import Bench
@@ -37,7 +37,7 @@ class Effect:
     parameters: Callable[[Bench, Variant, Coefficients], dict[str, Parameter]]
     laws: Laws
     lengths: tuple[str, ...]
-    finer: Callable[[Word], list[Variant]] | None
+    finer: Callable[[RefinementTarget], list[Variant]] | None
     beside: bool = False
     not_negative: tuple[str, ...] = ()
 

@@ -63,7 +63,7 @@ def curve_root(hinges: int) -> Array:
 
 def level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
     """A curve of no simple form, of a table that shows nothing else."""
-    if not bench.course.only_a_curve:
+    if not bench.load_history.only_a_curve:
         return []
     x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     levels = np.unique(np.append(np.abs(x), 0.0))

@@ -121,7 +121,7 @@ SATURATES = (0.3, 0.5, 0.8)  # of the joint's largest torque
 def slackening(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
     """Of a specimen that is driven to and fro: what gives way and wears its hole by that, so that
     it bears again only where it was last pushed to; alone, and beside strengths that rub."""
-    if bench.data.arm or not bench.imposed or bench.course.one_sided:
+    if bench.data.arm or not bench.imposed or bench.load_history.one_sided:
         return []
     torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
     span = bench.reach_of(torque)

@@ -21,7 +21,7 @@ from identification.gap.laws.law import (
 )
 from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.path import Path, with_loads, worked_in
-from identification.gap.model.variants import LASTING, SET_UP_ANEW, UNDER_WEIGHT, Variant
+from identification.gap.model.variants import LASTING, RESET_PER_SETUP, UNDER_WEIGHT, Variant
 
 SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
 EXPONENTIAL = ("Dahl", "Bouc-Wen")
@@ -45,7 +45,7 @@ _MEMORY = {
     "worked in": WORKED,
     "rested": LOST,
     UNDER_WEIGHT.strip(): HUNG,
-    SET_UP_ANEW.strip(): ANEW,
+    RESET_PER_SETUP.strip(): ANEW,
     LASTING.strip(): ACROSS,
 }
 
@@ -167,7 +167,7 @@ def no_knee(
         half = 0.5 * float(size[top])
         if float((np.sign(torque[top]) * torque[run]).min()) < -half:
             return None
-    elif bench.course.one_sided:
+    elif bench.load_history.one_sided:
         force = np.abs(bench.rows.measured_force)
         half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
     else:

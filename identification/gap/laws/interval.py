@@ -100,7 +100,7 @@ def _between(
 
 
 @dataclass(frozen=True, eq=False)
-class Softer:
+class ComplianceChange:
     """Relative changes of the springs' compliance beside an effect, by joint: value, variance, and
     covariance (k,) with the effect's coefficients. A joint without a spring of its own is absent.
     """
@@ -110,7 +110,7 @@ class Softer:
     cross: dict[int, Array]
 
 
-NOMINAL = Softer({}, {}, {})
+NOMINAL = ComplianceChange({}, {}, {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ class Coefficients:
 
     w: Array
     cov: Array
-    softer: Softer
+    softer: ComplianceChange
 
     def linear(self, functional: Array, unit: str, scale: float = 1.0) -> Parameter:
         """A linear function of the coefficients."""
@@ -147,7 +147,9 @@ class Coefficients:
         """The first k coefficients alone."""
         s = self.softer
         cross = {j: c[:k] for j, c in s.cross.items()}
-        return Coefficients(self.w[:k], self.cov[:k, :k], Softer(s.value, s.variance, cross))
+        return Coefficients(
+            self.w[:k], self.cov[:k, :k], ComplianceChange(s.value, s.variance, cross)
+        )
 
     def without_line(self, joint: int) -> Coefficients:
         """All coefficients but the last, which is what the joint's spring has more."""
@@ -160,7 +162,7 @@ class Coefficients:
         cross = s.cross.get(joint, np.zeros(len(self.w)))
         value = s.value.get(joint, 0.0) + float(functional @ self.w)
         variance = s.variance.get(joint, 0.0) + float(functional @ (moves + 2 * cross))
-        softer = Softer(
+        softer = ComplianceChange(
             {**s.value, joint: value},
             {**s.variance, joint: variance},
             {**s.cross, joint: cross + moves},

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.flow_back import flowing_back, yielded_from
-from identification.gap.laws.hardened import hardened
+from identification.gap.laws.bauschinger import flowing_back, yielded_from
+from identification.gap.laws.cyclic_accumulation import walking
+from identification.gap.laws.isotropic_hardening import hardened
 from identification.gap.laws.lasting import GIVES_LEAST, HARDENS, LEAST, SCALES
 from identification.gap.laws.memories import LIKELY, fresh_of, memories
 from identification.gap.laws.specimens import softening
-from identification.gap.laws.walks import walking
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (
     CALLED,
-    TAKEN_BACK,
+    RESET_PER_RUN,
     Variant,
     block,
     smooth_root,
@@ -65,7 +65,7 @@ def knee_at(
     flows back, and `back`, its columns by the share of `top` beyond which it has yielded."""
     top = _range(bench, load) if top is None else top
     # what a controller takes back it had clamped: no metal that flows back
-    metal = memory != TAKEN_BACK
+    metal = memory != RESET_PER_RUN
     back = flowing_back(bench, load, column, top, fresh_of(bench, memory)) if metal else {}
     return {"memory": memory, "load": load, "column": column, "top": top, "back": back}
 
@@ -87,7 +87,7 @@ def knees(
     which labels begin."""
     info = {**info, CALLED: name}
     arm, share = bench.data.arm, 0.7 / len(radius) * LIKELY[info["memory"]]
-    softens = not arm and not bench.course.unloads
+    softens = not arm and not bench.load_history.unloads
     extra, out = list(range(len(THRESHOLDS), len(radius))), []
     for k in range(_FIRST, len(THRESHOLDS)):
         for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
@@ -104,7 +104,7 @@ def knees(
             }
             at, chosen = f"{name} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += with_back(word, at, chosen, np.diag(kept), share / 4, exact)
-    if arm and bench.course.unloads:
+    if arm and bench.load_history.unloads:
         exact = {
             **info,
             "radius": radius,

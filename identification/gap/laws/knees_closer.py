@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.laws import flows, hardened
+from identification.gap.laws import flows, isotropic_hardening
 from identification.gap.laws.closer import (
-    Word,
+    RefinementTarget,
     closing_in,
     estimate,
     evidence,
@@ -21,7 +21,7 @@ from identification.gap.laws.closer import (
     shows,
 )
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.hardened import HARDENED
+from identification.gap.laws.isotropic_hardening import HARDENED
 from identification.gap.laws.knees import FLOWS_BACK, is_sharp, with_back
 from identification.gap.laws.lasting import SCALES
 from identification.gap.laws.memories import fresh_of
@@ -30,7 +30,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
     CALLED,
-    TAKEN_BACK,
+    RESET_PER_RUN,
     Variant,
     place_of,
 )
@@ -46,7 +46,7 @@ Place = tuple[str, Mapping[str, Any]]  # with which a knee's label begins; its `
 Between = Callable[[Bench, Variant], Sequence[Place]]
 
 
-def finer(word: Word, between: Between | None = None) -> list[Variant]:
+def finer(word: RefinementTarget, between: Between | None = None) -> list[Variant]:
     """Closer to the best knees that were found, and these at the word's other places. between:
     places about a knee that was found, where the grid of them is coarse."""
     if not shows(word):
@@ -59,8 +59,12 @@ def finer(word: Word, between: Between | None = None) -> list[Variant]:
     return closer + flat + lasts + _elsewhere(word, closer, between)
 
 
-def _hardened(word: Word, bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
-    return hardened.refined(bench, found, estimate(word.engine, found).coefficients, close)
+def _hardened(
+    word: RefinementTarget, bench: Bench, found: Variant, close: float = 1.0
+) -> list[Variant]:
+    return isotropic_hardening.refined(
+        bench, found, estimate(word.engine, found).coefficients, close
+    )
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
@@ -97,7 +101,9 @@ def _label(info: Mapping[str, Any]) -> str:
     return f"{info[CALLED]}{flow} at {info['centre']:.4g} {info['form']}"
 
 
-def _elsewhere(word: Word, closer: list[Variant], between: Between | None) -> list[Variant]:
+def _elsewhere(
+    word: RefinementTarget, closer: list[Variant], between: Between | None
+) -> list[Variant]:
     """The best of the finer knees at the other places of the word: without joint readings one may
     be as good as another, and that none was looked for there as closely is no evidence."""
     bench = word.engine.bench
@@ -180,8 +186,8 @@ def _moved(bench: Bench, found: Variant, place: Place, factor: float) -> Variant
 
 def _ways(bench: Bench, memory: str) -> list[flows.Way]:
     """What flows at once, and in all times that are looked for. A controller gives way at once."""
-    clamped = memory in (TAKEN_BACK, BACK_UNDER_WEIGHT)
-    if clamped or bench.rows.continuous or bench.course.timeless:
+    clamped = memory in (RESET_PER_RUN, BACK_UNDER_WEIGHT)
+    if clamped or bench.rows.continuous or bench.load_history.timeless:
         return [(0.0, False)]
     # what slows down so under a load that stands, a single spring can't tell from creep
     squared = SQUARE_S if bench.data.arm else ()

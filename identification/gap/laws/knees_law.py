@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.laws import flow_back
+from identification.gap.laws import bauschinger
+from identification.gap.laws.cyclic_accumulation import WALKS, walked
 from identification.gap.laws.flows import Flow, states
-from identification.gap.laws.hardened import HARDENED, grown
+from identification.gap.laws.isotropic_hardening import HARDENED, grown
 from identification.gap.laws.law import (
     ACROSS,
     ANEW,
@@ -21,13 +22,12 @@ from identification.gap.laws.law import (
     Term,
     fresh_after,
 )
-from identification.gap.laws.walks import WALKS, walked
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
     LASTING,
-    SET_UP_ANEW,
-    TAKEN_BACK,
+    RESET_PER_RUN,
+    RESET_PER_SETUP,
     UNDER_WEIGHT,
     Variant,
 )
@@ -35,10 +35,10 @@ from identification.gap.model.variants import (
 _MEMORY = {
     "": KEPT,
     LASTING: ACROSS,
-    TAKEN_BACK: LOST,
+    RESET_PER_RUN: LOST,
     UNDER_WEIGHT: HUNG,
     BACK_UNDER_WEIGHT: HUNG_LOST,
-    SET_UP_ANEW: ANEW,
+    RESET_PER_SETUP: ANEW,
 }
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
@@ -61,8 +61,8 @@ def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Ar
     if len(v.columns) > len(radius) + own:
         top = float(info["top"])
         after = {"after": info["back_from"] * top}
-        terms += [Term("compliance", {"returns_beyond": f * top} | after) for f in flow_back.BACK]
-        ratchet = {"ratchets_beyond": flow_back.RATCHET_FROM * top}
+        terms += [Term("compliance", {"returns_beyond": f * top} | after) for f in bauschinger.BACK]
+        ratchet = {"ratchets_beyond": bauschinger.RATCHET_FROM * top}
         terms.append(Term("compliance", ratchet | after))
     terms += [Term("compliance")] * own
     return Law(constants | place, tuple(terms)), np.full(len(terms), unit)
@@ -110,8 +110,8 @@ def _back(bench: Bench, law: Law, load: Array, fresh: Flags) -> dict[int, Array]
     returning, returns = _with(law, "returns_beyond")
     out = dict(zip(returning, bench.plays(load, returns, fresh).T, strict=True))
     for i, beyond in zip(*_with(law, "ratchets_beyond"), strict=True):
-        out[i] = flow_back.RATCHETS * flow_back.ratchet(load, beyond, fresh)
-    peaks = {a: flow_back.peaks(load, a, fresh) for a in set(after.tolist())}
+        out[i] = bauschinger.RATCHETS * bauschinger.ratchet(load, beyond, fresh)
+    peaks = {a: bauschinger.peaks(load, a, fresh) for a in set(after.tolist())}
     for i, a in zip(number, after.tolist(), strict=True):
         start = out[i][peaks[a]] if i in returning else 0.0
         out[i] = np.where(peaks[a] >= 0, out[i] - start, 0.0)

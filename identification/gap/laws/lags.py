@@ -47,7 +47,7 @@ def ahead_of_reading(bench: Bench, kind: str, lag: float) -> Array:
 
 def way_shown(bench: Bench) -> bool:
     """Whether the way of the driven channel was recorded, and need not be guessed."""
-    return bench.rows.continuous or bool(np.mean(bench.rows.on_the_way) > _SHOWN)
+    return bench.rows.continuous or bool(np.mean(bench.rows.in_ramp) > _SHOWN)
 
 
 _SHOWN = 0.1  # of the rows: then the way between levels was recorded, and need not be guessed

@@ -36,7 +36,9 @@ class Law:
 
 
 AS_THEY_ARE = "springs as they are"
-AS_IT_STANDS = "as_it_stands"  # a constant: of the torques on the arm as it stands (`as_it_stands`)
+AS_IT_STANDS = (
+    "as_it_stands"  # a constant: of the torques on the arm as it stands (`bench_of_actual_arm`)
+)
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Laws:
 
         Raises ValueError for a variant that says too little of itself.
         """
-        stands = variant.stands
+        stands = variant.to_actual_bench
         try:
             law, scale = self.describe(bench if stands is None else stands(bench), variant)
         except KeyError as missing:

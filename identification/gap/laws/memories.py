@@ -9,8 +9,8 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
     LASTING,
-    SET_UP_ANEW,
-    TAKEN_BACK,
+    RESET_PER_RUN,
+    RESET_PER_SETUP,
     UNDER_WEIGHT,
 )
 
@@ -18,8 +18,8 @@ from identification.gap.model.variants import (
 LIKELY = {
     "": 1.0,
     LASTING: 0.5,
-    SET_UP_ANEW: 0.5,
-    TAKEN_BACK: 0.3,
+    RESET_PER_SETUP: 0.5,
+    RESET_PER_RUN: 0.3,
     UNDER_WEIGHT: 1.0,
     BACK_UNDER_WEIGHT: 0.3,
 }
@@ -33,13 +33,13 @@ def memories(bench: Bench) -> dict[str, Flags]:
     if np.sum(moved) > 1:
         out[LASTING] = first
     if np.sum(bench.rebuilt) > np.sum(moved):
-        out[SET_UP_ANEW] = bench.rebuilt
+        out[RESET_PER_SETUP] = bench.rebuilt
     if np.sum(bench.rest) > np.sum(moved):
-        out[TAKEN_BACK] = moved | bench.rest
+        out[RESET_PER_RUN] = moved | bench.rest
     return out
 
 
 def fresh_of(bench: Bench, memory: str) -> Flags:
     """(n,) rows before which a joint of that memory is where it was."""
-    lost = TAKEN_BACK if memory == BACK_UNDER_WEIGHT else memory
+    lost = RESET_PER_RUN if memory == BACK_UNDER_WEIGHT else memory
     return memories(bench).get(lost, bench.moved)

@@ -29,7 +29,8 @@ _LEVELS = 2  # of imperfection, at most, that springs are found with
 
 
 def about_springs(laws: Laws, engine: Engine, found: Variant) -> Variant:
-    """What goes through the springs, with the springs as they are found to be with it alone."""
+    """A variant of what goes through the springs, linearised about the likeliest springs, which are
+    found together with it alone."""
     out, done = found, list[float]()
     for _ in range(_LEVELS):
         best = closest(score(engine, engine.levels, [out]))

@@ -25,8 +25,8 @@ from identification.gap.model.noise import Noise, estimate_noise
 from identification.gap.model.other_springs import springs_behind
 from identification.gap.model.path import Path, load_path
 from identification.gap.model.pool import Pool
-from identification.gap.recording.course import Course
 from identification.gap.recording.imposed import displacement_imposed
+from identification.gap.recording.load_history import LoadHistory
 from identification.gap.recording.rows import Rows, reduce_rows
 
 _MOVES_ON = 2.0  # times the noise of a sample
@@ -34,10 +34,11 @@ _MOVES_ON = 2.0  # times the noise of a sample
 
 @dataclass(frozen=True, eq=False)
 class KnownEffects:
-    """Stacked: what effects do that the simulation has, does (size,), and what is not known of
-    them, free (size, k), of independent unit coefficients called names (k); left m: what may stay
-    of them, rms. across: what they leave stays while the arm goes to another pose, which a model
-    that was made in one pose can't tell; these data do."""
+    """Effects that the simulation has already (`--model`). does (size,): their stacked
+    contribution. free (size, k): columns with independent unit-normal coefficients for what is
+    uncertain of them, names (k). left m: rms of their contribution that may remain. across: whether
+    what they leave for good outlasts a change of pose, which a model made in one pose can't tell;
+    these data choose."""
 
     does: Array
     free: Array
@@ -47,11 +48,12 @@ class KnownEffects:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
-    """How an arm stands and is loaded otherwise than simulated and read. lever (n, m) m: that it
-    has; torque (n, m) Nm: beside that of the load along the direction; ahead (n,) N: load beyond
-    what was read; moment (n, 3) m: change of the moment about the base's origin of a newton along
-    the direction; force (n, 3) N: that pulls across, and twist (n, 3) Nm: its moment there."""
+class ArmState:
+    """Where the actual arm differs from the nominal one, row by row. lever (n, m) m: actual levers
+    along the direction. torque (n, m) Nm: on the joints, beside that of the load along the
+    direction. ahead (n,) N: true load minus its reading (lag). moment (n, 3) m: change of the
+    moment about the base's origin per newton along the direction. force (n, 3) N: across the
+    direction; twist (n, 3) Nm: its moment about the base's origin."""
 
     lever: Array
     torque: Array
@@ -69,43 +71,35 @@ _FELT = 0.03  # of the range of the load's torque
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """Rows, layout, noise, and what effects are built from.
-
-    load (n,) N: what drives the rig, as a force. torque (n, m): torque of each joint under it.
-    lever (n, m). elastic (n, m) rad: deflection of each simulated joint. slope (n,) m/N: simulated
-    compliance along the direction, of springs and what is simulated beside them. sense: +1 where
-    the force is imposed and the effect adds displacement; -1 where the displacement is imposed and
-    the same effect takes force away.
-    reach m: largest simulated or measured response, the natural unit of what has no other.
-    scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
-    time and response about it.
-    columns: the pool, filled by the effects. moves (n,) m: what instruments of the response read,
-    where more is known of it than a straight line. stands: how the arm stands and is loaded,
-    where that is known to be otherwise.
-    """
+    """The observation model of one data set: n rows, the channels stacked to `size` values,
+    their noise, and a pool of columns that effects are made of. m joints."""
 
     data: GapData
     rows: Rows
-    layout: Layout
+    layout: Layout  # where the channels lie in what is stacked
     noise: Noise
-    imposed: bool
-    sense: float
-    compliance: Array
-    load: Array
+    imposed: bool  # the displacement is driven, and the force answers
+    sense: float  # +1; -1 where the displacement is imposed, as an effect takes force away then
+    compliance: Array  # (m,) rad/Nm about which all is linear
+    load: Array  # (n,) N that drives the rig
+    # (n,) m; where the displacement is imposed, the measured force times the stated
+    # compliance
     response: Array
-    torque: Array
-    lever: Array
-    elastic: Array
-    slope: Array
-    reach: float
-    scatter: Array
-    trend: Array
-    observed: Array
-    columns: Pool = field(default_factory=Pool)
-    flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
+    torque: Array  # (n, m) Nm under the load
+    lever: Array  # (n, m) m
+    elastic: Array  # (n, m) rad: deflection of each simulated joint
+    slope: Array  # (n,) m/N: simulated compliance along the direction
+    reach: float  # m: the largest response simulated or measured, the unit of what has no other
+    scatter: Array  # (n,) m^2: mean square of the samples about their row
+    trend: Array  # (n,) m s: mean product of time and response about the row
+    observed: Array  # (size,) what was measured
+    columns: Pool = field(default_factory=Pool)  # the pool, filled by the effects
+    # states of viscoplastic plays, which take a loop over rows, by `Flow.key`
+    flows: dict[bytes, Array] = field(default_factory=dict)
+    # (n,) m: the path of the response, where more is known of it than `line`
     moves: Array | None = None
-    known: KnownEffects | None = None
-    stands: Standing | None = None
+    known: KnownEffects | None = None  # effects that the simulation has already
+    arm_state: ArmState | None = None  # actual state of the arm; None: as simulated
     # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
     lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 
@@ -132,9 +126,9 @@ class Bench:
         return bool(zero.stop > zero.start)
 
     @cached_property
-    def course(self) -> Course:
+    def load_history(self) -> LoadHistory:
         """How the load went."""
-        return Course(
+        return LoadHistory(
             self.data,
             self.rows,
             self.imposed,
@@ -152,14 +146,14 @@ class Bench:
 
     @cached_property
     def line(self) -> Array:
-        """(n,) response that the slope measured in each setup gives for the load, m; or what is
-        known of it."""
+        """(n,) m: the response in proportion to the load, `line_slope * load`, or `moves` where
+        that is given. Instruments (gain, lag) act on it."""
         return self.line_slope * self.load if self.moves is None else self.moves
 
     @cached_property
     def moves_on(self) -> bool:
-        """Whether the mean of the response, but for what goes with the load, is another one from
-        one run of a setup to the next, by more than noise is."""
+        """Whether the mean of `response - line` differs between runs of one setup by more than
+        twice the noise of a sample."""
         left = self.response - self.line
         return means_move(self.rows, self.load, left, _MOVES_ON * self.noise.stated)
 
@@ -176,13 +170,14 @@ class Bench:
     def true_load(self) -> Array:
         """(n,) N: the load without the drift and the lag of its reading."""
         read = self.load - self.zero_line
-        return np.asarray(read if self.stands is None else read + self.stands.ahead)
+        return np.asarray(read if self.arm_state is None else read + self.arm_state.ahead)
 
     @cached_property
     def true_torque(self) -> Array:
-        """(n, m) Nm on the joints without it: what thresholds, plays and friction answer to."""
+        """(n, m) Nm: torques under `true_load`, that is without drift and lag of the reading, and
+        with those of `arm_state`. Thresholds, plays and friction answer to these."""
         along = self.lever * self.true_load[:, None]
-        return np.asarray(along if self.stands is None else along + self.stands.torque)
+        return np.asarray(along if self.arm_state is None else along + self.arm_state.torque)
 
     def reach_of(self, load: Array) -> float:
         """Range of a load with zero in it. Where the displacement is imposed: of what the rig
@@ -198,10 +193,10 @@ class Bench:
         _FURTHER more: what has yielded hardens over all of it, or softens. Up to half of its
         range, since it is gone both ways; a single pull goes but one."""
         full, last = float(np.ptp(np.append(load, 0.0))), float(inner[-1])
-        far = (_ONE_WAY if self.course.once else 0.5) * full
+        far = (_ONE_WAY if self.load_history.monotonic else 0.5) * full
         if not self.imposed or far <= last:
             return inner
-        evenly = self.course.once or _FIRST * last > far
+        evenly = self.load_history.monotonic or _FIRST * last > far
         start = min(_FIRST, (far / last) ** (1 / _FURTHER)) if evenly else _FIRST
         return np.concatenate([inner, np.geomspace(start * last, far, _FURTHER)])
 
@@ -311,16 +306,21 @@ class Bench:
             object.__setattr__(out, name, value)
         return out
 
-    def standing(self, there: Standing) -> Bench:
-        """The bench of an arm that stands and is loaded so; what is known of it else stays, and its
-        pool."""
-        _ = self.stated_slope, self.course  # are told by the levers that are simulated
-        out = copy(self)
-        for name in ("true_load", "true_torque", "likelier_joints"):
-            out.__dict__.pop(name, None)
+    def with_arm_state(self, there: ArmState) -> Bench:
+        """The bench of an arm in that state; its pool stays, and what is told by the levers that
+        are simulated."""
+        kept = {name: getattr(self, name) for name in ("stated_slope", "load_history")}
         torque = there.lever * self.load[:, None] + there.torque
         values = {"lever": there.lever, "torque": torque, "elastic": torque * self.compliance}
-        for name, value in {**values, "stands": there, "flows": {}, "lags": {}}.items():
+        return self._changed(**values, arm_state=there, **kept)
+
+    def _changed(self, **values: object) -> Bench:
+        """A copy with other values, without what was worked out of the old ones."""
+        out = copy(self)
+        for name, of_class in vars(Bench).items():
+            if isinstance(of_class, cached_property):
+                out.__dict__.pop(name, None)
+        for name, value in {"flows": {}, "lags": {}, **values}.items():
             object.__setattr__(out, name, value)
         return out
 
@@ -385,11 +385,12 @@ class Bench:
         return [j for j in range(self.data.joints) if part[:, j].max() > 0.01 * total]
 
     @cached_property
-    def likelier_joints(self) -> Array:
-        """(m,) nats by which a mechanism of so much at the target is likelier in one joint than in
-        another: troubles are a share of what a joint gives, mostly of a few percent to about all of
-        it, so the same at the target is a likelier share of a joint that moves that far. Half a nat
-        for a factor e; 0 on average, of joints that hardly move, and of a rig without an arm."""
+    def joint_log_priors(self) -> Array:
+        """(m,) nats: log prior of a mechanism sitting in each joint, 0 on average over those that
+        move. Mechanisms are a share of a joint's deflection, mostly of a few percent to about all
+        of it; so the same motion of the target is a likelier share of a joint that contributes
+        much: half the log of its largest contribution. 0 for joints that hardly move, and without
+        an arm."""
         out, moving = np.zeros(self.data.joints), self.moving_joints()
         if not self.data.arm or not moving:
             return out

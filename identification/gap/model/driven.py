@@ -72,12 +72,12 @@ def driven(data: GapData, rows: Rows, imposed: bool) -> Array:
     meter = data.instruments
     if rows.continuous:
         if imposed:
-            return standing(rows, rows.displacement, meter.displacement)
-        return standing(rows, rows.force, meter.force)
+            return with_dwell_means(rows, rows.displacement, meter.displacement)
+        return with_dwell_means(rows, rows.force, meter.force)
     return rows.rested if imposed else rows.force
 
 
-def standing(rows: Rows, driven: Array, stated: float) -> Array:
+def with_dwell_means(rows: Rows, driven: Array, stated: float) -> Array:
     """What is driven (n,) with the mean of every stretch of a running recording in which it stands.
     Of what goes so slowly all the time that a few rows hardly tell it from standing, or goes
     straight on, the mean about every row."""

@@ -92,7 +92,8 @@ def beginnings(fresh: Flags) -> Flags:
 
 
 def whiles(fresh: Flags) -> list[tuple[int, int]]:
-    """First row of every while in which a memory counts, and the one after its last."""
+    """[(start, end), ...]: rows between two resets of the memory, end exclusive; the first begins
+    at row 0."""
     return list(pairwise([*np.flatnonzero(beginnings(fresh)).tolist(), len(fresh)]))
 
 
@@ -140,8 +141,9 @@ def _let_go(
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Seconds (n,) since the row before, in all, and of these in their order: the old load stands
-    on, nothing is loaded, the load ramps, it stands. After a rest only the last of it is ramp."""
+    """How the time since the row before was spent, (n,) s each. step: all of it; then in this order
+    pause: the old load stands on; unloaded; ramp; stands: the new load stands. After a rest the
+    ramp takes the last 5 s at most."""
 
     step: Array
     pause: Array
@@ -155,8 +157,8 @@ def phases_of(rows: Rows, rest: Flags, stood: float = 0.0) -> Phases:
     which the old load stood on, which no row shows."""
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
-    stands = np.minimum(settling_share(rows), ease)
-    pause = np.minimum(standing_on(rows), np.where(rest, step - ease, ease - stands))
+    stands = np.minimum(time_under_load(rows), ease)
+    pause = np.minimum(hold_time_after_row(rows), np.where(rest, step - ease, ease - stands))
     pause += np.where(rest, stood * (step - ease - pause), 0.0)
     ramp = np.maximum(ease - stands - np.where(rest, 0.0, pause), 0.0)
     return Phases(step, pause, np.where(rest, step - ease - pause, 0.0), ramp, stands)
@@ -238,14 +240,15 @@ def _prefix(keep: Array, gain: Array) -> Array:
     return gain
 
 
-def settling_share(rows: Rows) -> Array:
-    """(n,) s: how long the load has stood before a row: half a sample at the start of a hold."""
+def time_under_load(rows: Rows) -> Array:
+    """(n,) s: from the arrival of the load at its level to the row, or since the row before: half a
+    sampling period in the first row of a hold, 0 in the others and in running recordings."""
     if rows.continuous:
         return np.zeros(rows.n)
     return np.where(rows.hold_starts, rows.half_sample, 0.0)
 
 
-def standing_on(rows: Rows) -> Array:
+def hold_time_after_row(rows: Rows) -> Array:
     """(n,) s: how long the old load still stood after the time of the row before, 0 within holds:
     the time of a row is the mean of its samples', the load moves half a sample after the last."""
     if rows.continuous:
@@ -254,14 +257,14 @@ def standing_on(rows: Rows) -> Array:
     return np.where(rows.hold_starts, last, 0.0)
 
 
-def unread_way(rows: Rows) -> float | None:
-    """s that the load is on its way from one level to the next, which no reading shows: median over
-    holds; None of a recording that runs on, or of a single hold."""
+def unread_ramp_duration(rows: Rows) -> float | None:
+    """Median duration (s) of the ramps between holds, which no reading shows. None in running
+    recordings, and of a single hold."""
     begins = rows.hold_starts & ~rows.starts
     if rows.continuous or not begins.any():
         return None
     gaps = np.diff(rows.session, prepend=rows.session[0])
-    return float(np.median((gaps - settling_share(rows) - standing_on(rows))[begins]))
+    return float(np.median((gaps - time_under_load(rows) - hold_time_after_row(rows))[begins]))
 
 
 def sampling_time(rows: Rows) -> float:

@@ -10,7 +10,7 @@ from identification.arrays import Array, Ints
 from identification.gap.data import GapData
 from identification.gap.model.driven import steepness
 from identification.gap.model.encoders import readings_of
-from identification.gap.recording.digits import digit_of, in_one_number, left_of
+from identification.gap.recording.digits import in_one_number, left_of, quantization_step
 from identification.gap.recording.holds import (
     hold_ids,
     rest_ids,
@@ -35,32 +35,23 @@ NOISY, SWINGS = 3.0, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
-    already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
-    one sample. raised: how many times what is stated readings scatter, of a running recording or
-    within holds, at least 1.
-    sure: of an arm's instruments, or of a running recording that shows no less than stated; what
-    else is stated is known to a factor UNSURE.
-    swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
-    which share of what is stated it may differ from hold to hold. seen: of one
-    sample, m, as far as a rig without an arm showed it: 0 where it read every level but once.
-    q_hold (m, holds): what digits leave of a hold's; q_run, q_setup: common to the readings of a
-    joint in a run, in a setup, rad."""
+    """Standard deviations of what is random in the channels. m joints."""
 
-    response: Array
-    q: Array
-    q_hold: Array
-    force: float
-    hold: Array
-    run: float
-    stated: float
-    raised: float = 1.0
-    sure: bool = True
-    swings: float = 0.0
-    slow: float = 0.0
+    response: Array  # (n,) m of a row, divided by the root of its weight already
+    q: Array  # (m,) rad of a sample
+    q_hold: Array  # (m, holds) rad: what the digits leave of a hold's mean
+    force: float  # N of a sample
+    hold: Array  # (n,) m common to a hold
+    run: float  # m common to a run
+    stated: float  # m of a sample of the response, as stated
+    raised: float = 1.0  # times that readings scatter more than stated, at least 1
+    sure: bool = True  # what is stated holds; else it is known to a factor UNSURE
+    swings: float = 0.0  # how far an arm goes to and fro while nothing changes, in what is stated
+    slow: float = 0.0  # share of what is stated that may differ from hold to hold
+    # m of a sample, as a rig without an arm showed it; 0: every level was read once
     seen: float = 0.0
-    q_run: float = 0.0
-    q_setup: float = 0.0
+    q_run: float = 0.0  # rad common to a joint's readings in a run
+    q_setup: float = 0.0  # rad common to a joint's readings in a setup
 
     @property
     def misjudged(self) -> bool:
@@ -76,7 +67,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
     of_force = meter.force / np.sqrt(rows.hold_weight)
-    step = 0.0 if rows.continuous else digit_of(data, "force")
+    step = 0.0 if rows.continuous else quantization_step(data, "force")
     if step > 0 and in_one_number(data.force, hold):
         means = rows.hold_means(rows.measured_force)
         of_force = np.maximum(of_force, left_of(means, rows.setup[rows.edges], step)[rows.hold])
@@ -95,7 +86,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         per_sample = _white(data, rows, alone, slope, hold)
     if not rows.continuous:
         moving = np.hypot(np.maximum(per_sample, fallback), _apart(rows))
-        per_sample = np.where(rows.on_the_way, moving, per_sample)
+        per_sample = np.where(rows.in_ramp, moving, per_sample)
     weight = np.ones(rows.n) if rows.continuous else rows.weight
     stated = meter.displacement
     if rows.continuous or imposed:

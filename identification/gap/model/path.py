@@ -34,9 +34,9 @@ class Path:
         return self.at_rows(bristles(self.load, reach, self.fresh, elastic, self.weight))
 
     def slacks(self, radius: Array) -> Array:
-        """Forces (n, k), as loads, of elements that give way at radii (k,) and wear their holes by
-        that: none until the load is back where they were last pushed to, less the radius, on either
-        side for itself."""
+        """(n, k) in units of the load: force of elements that slip at thresholds (k,) and wear
+        their holes by that. One carries nothing until the load is back where it was last pushed to,
+        less the threshold; each sense has a clearance of its own."""
         out = np.zeros((len(self.load), len(radius)))
         for a, b in whiles(self.fresh):
             for sign in (1.0, -1.0):

@@ -15,39 +15,35 @@ from identification.arrays import Array
 UNDER_WEIGHT = " under weight"  # a memory that begins with the weight coming on
 BACK_UNDER_WEIGHT = " under weight, taken back"  # one that is lost between runs, but for the weight
 LASTING = " lasting"  # one that outlasts the arm's way to another pose
-TAKEN_BACK = " taken back"  # one that is lost between runs
-SET_UP_ANEW = " set up anew"  # one that is lost when the rig is turned to another direction
+RESET_PER_RUN = " taken back"  # one that is lost between runs
+RESET_PER_SETUP = " set up anew"  # one that is lost when the rig is turned to another direction
 
 # In `info`: where it acts, if not on the simulated arm; and which word makes the arm stand so.
-STANDS, ANSWERS_TO = "stands", "answers_to"
+TO_ACTUAL_BENCH, ANSWERS_TO = "to_actual_bench", "answers_to"
 CALLED = "called"  # in `info`: what a place and a memory are called, with which labels begin
 WARMS_UP = "T "  # a path in time of one rate is called so, and by its share of the session
 
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
-    `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
-    coefficients that physics wants above `least` (None: either sign). each (k,): coefficients that
-    may not be negative either. within (m, k): weights of further sums that are above floor (m,).
-    cost: nats less of evidence, for what its columns took from the data themselves. info: the facts
-    of its law, by names that its own effect gives them and reports from; what others may ask of a
-    variant are the properties below.
-    """
+    """One shape of an effect: k columns of the pool with a Gaussian prior. What others may ask
+    of its law are the properties below."""
 
     word: str
-    label: str
-    columns: tuple[int, ...]
-    scales: tuple[float, ...]
-    root: Array
-    positive: Array | None = None
+    label: str  # for people; nothing reads it
+    columns: tuple[int, ...]  # indices of the pool
+    scales: tuple[float, ...]  # prior sizes s, all equally likely
+    root: Array  # (k, k): covariance of the coefficients w is `s^2 root root^T`
+    positive: Array | None = None  # (k,) p: limit `p @ w > least`; None: either sign
     least: float = 0.0
-    each: tuple[bool, ...] = ()
+    each: tuple[bool, ...] = ()  # (k,) coefficients that may not be negative either
+    # (l, k): further limits `within @ w > floor`
     within: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    floor: Array = field(default_factory=lambda: np.zeros(0))
+    floor: Array = field(default_factory=lambda: np.zeros(0))  # (l,)
+    # facts of its law, by names that its own effect gives them and reports from
     info: Mapping[str, Any] = field(default_factory=dict)
-    prior: float = 1.0
-    cost: float = 0.0
+    prior: float = 1.0  # of its shape, against others of the word
+    cost: float = 0.0  # nats: of evidence, for what its columns took from the data themselves
 
     @property
     def log_prior(self) -> float:
@@ -65,9 +61,9 @@ class Variant:
         return self.info.get("compliance")
 
     @property
-    def stands(self) -> Callable[[Any], Any] | None:
+    def to_actual_bench(self) -> Callable[[Any], Any] | None:
         """From the simulated arm's bench to that on which it acts, if that is another one."""
-        return self.info.get(STANDS)
+        return self.info.get(TO_ACTUAL_BENCH)
 
     @property
     def answers_to(self) -> str | None:

@@ -21,12 +21,12 @@ _MULTIPLE = 0.05  # of a step by which a value may be off the lattice: conversio
 _SAME = 1e-9  # of the range: digits that a conversion of units leaves
 
 
-def as_fine_as_digits(data: GapData) -> GapData:
+def with_quantization_noise(data: GapData) -> GapData:
     """The data with an uncertainty of force and displacement that their digits allow; as they are
     where these are fine enough."""
     meter, notes = data.instruments, list[str]()
     for channel, unit, per_unit in (("force", "N", 1.0), ("displacement", "mm", 1e-3)):
-        stated, step = getattr(meter, channel), digit_of(data, channel)
+        stated, step = getattr(meter, channel), quantization_step(data, channel)
         if (least := step / 12**0.5) > stated:
             meter = replace(meter, **{channel: least})
             notes.append(
@@ -51,7 +51,7 @@ def left_of(means: Array, setup: Ints, step: float) -> Array:
     return np.asarray(step / 12**0.5 * np.sqrt(np.bincount(same.ravel())[same.ravel()]))
 
 
-def digit_of(data: GapData, channel: str) -> float:
+def quantization_step(data: GapData, channel: str) -> float:
     """Step (N, m) in which a channel is read; 0 where none shows, or where it may be what was set
     rather than read."""
     values = from_first(getattr(data, channel), data.run)

@@ -14,7 +14,7 @@ from identification.arrays import Array, Flags, Ints
 from identification.gap.data import GapData
 from identification.gap.recording.glitches import picked
 from identification.gap.recording.holds import hold_ids, is_continuous
-from identification.gap.recording.turns import way_back
+from identification.gap.recording.turns import largest_reversal
 
 _FEWEST = 20  # readings: of fewer nothing is known of what is sudden
 _FALLS, _LOADED = 0.25, 0.5  # of the largest force: so far it falls, from that at least,
@@ -34,7 +34,8 @@ def without_ends(data: GapData) -> GapData:
     if after.any():
         notes.append(
             "The force falls at once while the stroke goes on "
-            f"({data.moment(int(after.argmax()))}): a break. {_readings(after)} after it set aside."
+            f"({data.time_label(int(after.argmax()))}): a break. "
+            f"{_readings(after)} after it set aside."
         )
     if before.any():
         notes.append(
@@ -78,7 +79,9 @@ def _break(force: Array, u: Array, uncertainty: float) -> int | None:
     first = int(sudden.argmax())  # of two readings that a fall may take
     k = first + 1 + int(step[first + 1] > step[first])
     path = (u[: k + 1] - u[0]) * np.sign(u[k - 1] - u[0])
-    pulled = way_back(path[:k]) < _BACK * np.ptp(u) and path[k] > path[k - 1] - _LITTLE * np.ptp(u)
+    pulled = largest_reversal(path[:k]) < _BACK * np.ptp(u) and path[k] > path[
+        k - 1
+    ] - _LITTLE * np.ptp(u)
     gone = size[k:].max() < _RECOVERS * size[k - 1] or len(size) - k <= _MOST * len(size)
     return k if sudden[first] and pulled and gone else None
 

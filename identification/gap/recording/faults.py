@@ -138,8 +138,8 @@ def _broken(data: GapData) -> str:
         return ""
     return (
         "The force falls at once while the stroke goes on "
-        f"({data.moment(int(broken.argmax()))}), and {100 * broken.mean():.0f} % of the readings "
-        "come after that: a break. End the recording there to learn of what was before."
+        f"({data.time_label(int(broken.argmax()))}), and {100 * broken.mean():.0f} % of the "
+        "readings come after that: a break. End the recording there to learn of what was before."
     )
 
 

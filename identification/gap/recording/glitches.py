@@ -41,7 +41,7 @@ def without_glitches(data: GapData) -> GapData:
     count = int(off.sum())
     note = (
         f"{count} of {len(off)} readings jump off and come back at once: set aside as glitches "
-        f"(the first {data.moment(int(off.argmax()))}). See to cables, converter and clamps."
+        f"(the first {data.time_label(int(off.argmax()))}). See to cables, converter and clamps."
     )
     return picked(data, ~off, note)
 

@@ -20,7 +20,7 @@ from identification.gap.data import ZERO, GapData
 from identification.gap.recording.bins import even_path
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.pieces import MISJUDGED, TOP, TURNS, Channel, cost, legs, zigzag
-from identification.gap.recording.turns import turns, way_back
+from identification.gap.recording.turns import largest_reversal, turns
 from identification.gap.recording.white import white_sd
 from identification.running import first_rows
 
@@ -94,7 +94,7 @@ def approaches(data: GapData, mine: Ints) -> bool:
     none = max(_NO_FORCE * float(force.max()), _BEYOND * data.instruments.force)
     end = int(np.argmax(force > none))
     early = np.abs(data.force[mine[:end]]).max(initial=0.0) > 2 * none
-    back = way_back(path) > _NO_FORCE * float(path.max())
+    back = largest_reversal(path) > _NO_FORCE * float(path.max())
     if early or back or not force[end] > none:
         return False
     last = max(end - 1, 0)  # with the first force that is felt a rig gives way at once
@@ -123,7 +123,7 @@ def _goes_on(force: Array, moved: Array, sd: float) -> bool:
     last = first + int(size[first:].argmin())
     noise = max(white_sd(np.diff(force, 2)), sd)
     fell = size[first] - size[last] > max(_FALLS * size[first], _CLEARLY * noise)
-    return bool(fell and way[last] - way[first] > _FURTHER and way_back(way) < TOP)
+    return bool(fell and way[last] - way[first] > _FURTHER and largest_reversal(way) < TOP)
 
 
 _FALLS, _FURTHER = 0.08, 0.05  # of the largest force; of the way

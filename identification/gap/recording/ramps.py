@@ -2,7 +2,7 @@
 
 Whoever records all the time has holds that begin with the ramp that led there. Averaged with the
 hold, a ramp is neither at rest nor on its way; and its scatter would pass for noise of the force.
-Its samples are told (`GapData.on_the_way`): they are holds of their own, read as they are. Where
+Its samples are told (`GapData.in_ramp`): they are holds of their own, read as they are. Where
 every sample bears the name of the level next to it, the first half of a ramp is under the name of
 the level it leaves, and all of it may be; it is given to the level it leads to.
 """
@@ -29,7 +29,7 @@ _LAST = 0.25  # share of a hold whose mean is where it leads to
 _TO_GO = 0.25  # of a step
 
 
-def ramps_told(data: GapData) -> GapData:
+def with_ramps_marked(data: GapData) -> GapData:
     """The data with ramps told; of what runs all the time, those that lead to no load. As they are
     where there are none."""
     data = _leading_on(steps_numbered(data))
@@ -37,7 +37,7 @@ def ramps_told(data: GapData) -> GapData:
     moving = _moving(data, hold)
     if is_continuous(data, hold):
         moving &= data.branch == ZERO
-    return replace(data, on_the_way=moving) if moving.any() else data
+    return replace(data, in_ramp=moving) if moving.any() else data
 
 
 def steps_numbered(data: GapData) -> GapData:

@@ -32,58 +32,49 @@ _MOMENT = 0.05  # of the time between two levels that were read once
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """n rows. weight (n,): samples behind a row; hold, level, run, setup (n,): consecutive ids.
+    """n rows, each the mean of a few samples: what the diagnosis computes with. Ids are
+    consecutive."""
 
-    level: same setup, branch and step (or class of force and sense of motion): what repeats from
-    repetition to repetition shares a level. on_the_way (n,): rows of ramps that were recorded
-    before holds. session (n,) s is always there: `clock` says whether it was recorded; to_last
-    (n,) s: from a row's time to its last sample. force: of a hold whose samples scatter by no more
-    than their noise, the mean of the hold in all its rows (its noise would else pass for a small
-    friction or a lag);
-    measured_force: as it is. steady (n,): such holds. rested (n,) m: the displacement with its
-    mean likewise; rests (n,): such holds. hold_weight (n,): samples of the row's hold;
-    force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2 and
-    m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
-    displacement_trend (n,): mean products of time and channel about the row, N s and m s.
-    overshoot (n,): share of a row's load by which the load went beyond it before, on the way there,
-    that no row shows: found, not recorded (`search.unseen`), and 0 until then. onward (n,): share
-    of the load of the row before by which it went on from there, that no row shows: it was told.
-    """
-
-    time: Array
-    session: Array
-    to_last: Array
+    time: Array  # (n,) s within the run
+    session: Array  # (n,) s, always there: `clock` says whether it was recorded
+    to_last: Array  # (n,) s from a row's time to its last sample
     clock: bool
     run: Ints
     setup: Ints
     repetition: Ints
     branch: Ints
     step: Ints
-    hold: Ints
+    hold: Ints  # (n,) id: samples at one level without a pause
+    # (n,) id: same setup, branch and step (or class of force and sense of motion): what
+    # repeats from repetition to repetition shares a level
     level: Ints
-    weight: Array
+    weight: Array  # (n,) samples behind a row
+    # (n,) N; in `steady` holds the mean of the hold, as its noise would pass for a small
+    # friction or a lag
     force: Array
-    measured_force: Array
-    displacement: Array
-    rested: Array
-    tangential: Array | None
-    q: Array | None
-    temperature: Array | None
-    zero: Flags
-    on_the_way: Flags
-    steady: Flags
-    rests: Flags
-    hold_weight: Array
-    force_scatter: Array
-    displacement_scatter: Array
-    spread: Array
-    force_trend: Array
-    displacement_trend: Array
-    continuous: bool
-    starts: Flags  # first row of a run
-    hold_starts: Flags
+    measured_force: Array  # (n,) N: the mean of the row in any case
+    displacement: Array  # (n,) m
+    rested: Array  # (n,) m: the displacement; in holds that rest the mean of the hold
+    tangential: Array | None  # (n, 2) N
+    q: Array | None  # (n, m) rad
+    temperature: Array | None  # (n, t) degC
+    zero: Flags  # (n,) rows without load
+    in_ramp: Flags  # (n,) rows of ramps that were recorded before holds
+    steady: Flags  # (n,) rows of holds whose force scatters by no more than its noise
+    rests: Flags  # (n,) the same of the displacement
+    hold_weight: Array  # (n,) samples of the row's hold
+    force_scatter: Array  # (n,) N^2: mean square of the samples about their row
+    displacement_scatter: Array  # (n,) m^2
+    spread: Array  # (n,) s^2: the same of their times, in rows of holds
+    force_trend: Array  # (n,) N s: mean product of time and force about the row
+    displacement_trend: Array  # (n,) m s
+    continuous: bool  # the load runs, and does not rest at levels
+    starts: Flags  # (n,) first row of a run
+    hold_starts: Flags  # (n,) first row of a hold
+    # (n,) share of a row's load by which the load went beyond it on the way there, which no
+    # row shows: found, not recorded (`search.overshoots`), 0 until then
     overshoot: Array
-    onward: Array
+    onward: Array  # (n,) as in `GapData`
 
     @property
     def n(self) -> int:
@@ -237,7 +228,7 @@ def reduce_rows(data: GapData) -> Rows:
         q=bins.mean_of(data.q),
         temperature=bins.mean_of(data.temperature),
         zero=at_zero & ~coming,
-        on_the_way=ramp,
+        in_ramp=ramp,
         continuous=bins.running,
         starts=_changes(run),
         hold_starts=_changes(holds),

@@ -20,7 +20,7 @@ def turns(force: Array, share: float = 0.25) -> list[int]:
     return [at * stride for at in turning_points(force[::stride], back)]
 
 
-def way_back(path: Array) -> float:
+def largest_reversal(path: Array) -> float:
     """How far a path (n,) falls back from the largest value before."""
     return float((np.maximum.accumulate(path) - path).max())
 

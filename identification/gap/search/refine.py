@@ -5,7 +5,7 @@ from __future__ import annotations
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.compare import Scored, by_word, closest, marginal
 from identification.gap.evidence.engine import Engine
-from identification.gap.laws.closer import WINDOW, Word, nearly_leads, scored_beside
+from identification.gap.laws.closer import WINDOW, RefinementTarget, nearly_leads, scored_beside
 from identification.gap.model.variants import Variant
 
 _LEADING = 6  # words that are refined
@@ -27,7 +27,7 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
         alone, others = (
             sorted(s, key=lambda s: -s.log_evidence) for s in (families[name], beside.get(name, []))
         )
-        word = Word(engine, families, ranked, alone, others)
+        word = RefinementTarget(engine, families, ranked, alone, others)
         if not clean or nearly_leads(word):
             out += finer(word)
     return out

@@ -11,8 +11,8 @@ from identification.gap.evidence.compare import Scored, by_word, closest, log_me
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.finer import BELOW, PARTS, gained
 from identification.gap.evidence.imperfection import LOG_STEP
+from identification.gap.evidence.lognormal_springs import lognormal_prior_correction, stated_between
 from identification.gap.evidence.parts import Part, part_sizes
-from identification.gap.evidence.stiffness import as_stiff_as_stated, stated_between
 from identification.gap.explanations.explanation import (
     Explanation,
     SearchResult,
@@ -25,12 +25,12 @@ from identification.gap.explanations.several import in_more_joints, in_one_joint
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.model.noise import UNSURE
 from identification.gap.model.variants import Variant, able_beside
-from identification.gap.search.acting import acting_anew
+from identification.gap.search.mechanisms_refit import refit_mechanism_variants
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
+from identification.gap.search.springs_refit import relinearised_variants
 from identification.gap.search.standing import standing_anew
-from identification.gap.search.through import through_springs_anew
-from identification.gap.words import MECHANISMS, NAMELESS, SPRINGS
+from identification.gap.words import MECHANISMS, SPRINGS, UNMODELLED
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
 # factor of two.
@@ -81,17 +81,17 @@ def search(
     _polish_rivals(engine, all_of_them, pool, closely)
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
     ranked = measured(engine, ranked)
-    named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
+    named = tuple(e for e in ranked if not e.words & frozenset(UNMODELLED))
     strange = {
         lv.eta: _base_at(engine, lv.number) for lv in engine.levels if lv.eta > _hidden(engine)
     }
     found = SearchResult(
         engine=engine,
         explanations=named,
-        nameless=tuple(e for e in ranked if e not in named),
-        alone={w: v - none for w, v in alone.items() if w not in NAMELESS},
+        unmodelled=tuple(e for e in ranked if e not in named),
+        alone={w: v - none for w, v in alone.items() if w not in UNMODELLED},
         probabilities={},
-        unknown=log_mean(list(strange.values())) + log_unknown(engine.bench.course),
+        unknown=log_mean(list(strange.values())) + log_unknown(engine.bench.load_history),
         unknown_eta=max(strange, key=lambda eta: strange[eta]),
         variants=tuple(all_of_them),
     )
@@ -113,7 +113,7 @@ def _as_stated(engine: Engine) -> float:
 
 def _base_at(engine: Engine, level: int) -> float:
     """log evidence of the base alone at a level, springs as they are stated."""
-    return engine.levels[level].log_base + as_stiff_as_stated(engine, (), level)
+    return engine.levels[level].log_base + lognormal_prior_correction(engine, (), level)
 
 
 # What readings have in common with the next ones of their hold, they have with all of it, and more:
@@ -130,7 +130,7 @@ def _hidden(engine: Engine) -> float:
     return (max(swings, _FROM_HOLD * noise.slow) if noise.sure else UNSURE) * noise.stated
 
 
-def force(
+def with_forced_words(
     engine: Engine,
     variants: Sequence[Variant],
     pool: tuple[Explanation, ...],
@@ -322,7 +322,7 @@ def _anew(
         return found
     for _ in range(_TURNS):  # where the arm stands was found beside a law of the simulated torques
         plain = in_one_joint_each(found)
-        fresh = acting_anew(engine, plain)
+        fresh = refit_mechanism_variants(engine, plain)
         acting = polished(engine, [*variants, *fresh], plain) if fresh else plain
         if acting.log_weight <= found.log_weight + _TURN_GAINS:
             break
@@ -350,7 +350,7 @@ def _read_and_placed(engine: Engine, start: Explanation) -> list[Variant]:
     return [
         *reading_all(engine, start),
         *standing_anew(engine, start),
-        *through_springs_anew(engine, start),
+        *relinearised_variants(engine, start),
     ]
 
 
@@ -377,5 +377,7 @@ def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
         level = int(np.argmin(np.abs(engine.etas - e.eta)))
         more = gained(engine, e.parts, part_sizes(engine, e.parts, level).energy)
         most = max(most, more)
-        done[e.words] = replace(e, log_weight=e.log_weight + more, log_good=e.log_good + more)
+        done[e.words] = replace(
+            e, log_weight=e.log_weight + more, log_adequate=e.log_adequate + more
+        )
     return sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)

@@ -211,7 +211,7 @@ def _filtered(time: Array, signal: Array, lag_s: float, law: str, damping: float
 # where load and arm stand
 
 
-def aslant(law: str) -> Callable[[Scene, Generator], Drawn]:
+def misaligned_load(law: str) -> Callable[[Scene, Generator], Drawn]:
     """A share of the load acts across the direction."""
 
     def draw(scene: Scene, random: Generator) -> Drawn:
@@ -242,7 +242,7 @@ def aslant(law: str) -> Callable[[Scene, Generator], Drawn]:
     return draw
 
 
-def elsewhere(law: str) -> Callable[[Scene, Generator], Drawn]:
+def wrong_pose(law: str) -> Callable[[Scene, Generator], Drawn]:
     """The tool is offset by `size` x 100 mm, or joints stand off by `size` x 2 degrees."""
 
     def draw(scene: Scene, random: Generator) -> Drawn:
@@ -306,13 +306,13 @@ FORMS: dict[str, tuple[Form, ...]] = {
         Form("force_window", False, lagging("force", "window")),
     ),
     "load_misalignment": (
-        Form("one_direction", True, aslant("one_direction")),
-        Form("each_direction", True, aslant("each_direction")),
-        Form("turns_with_load", False, aslant("turns_with_load")),
+        Form("one_direction", True, misaligned_load("one_direction")),
+        Form("each_direction", True, misaligned_load("each_direction")),
+        Form("turns_with_load", False, misaligned_load("turns_with_load")),
     ),
     "pose_error": (
-        Form("tool", True, elsewhere("tool")),
-        Form("joint", True, elsewhere("joint")),
-        Form("tool_and_joint", False, elsewhere("both")),
+        Form("tool", True, wrong_pose("tool")),
+        Form("joint", True, wrong_pose("joint")),
+        Form("tool_and_joint", False, wrong_pose("both")),
     ),
 }

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rig.arrays import Array
 from rig.errors import InputError, close_to
-from rig.worlds.hidden import channel_laws, joint_laws, label, outer_laws, strange_laws
+from rig.worlds.hidden import channel_laws, joint_laws, label, outer_laws, unmodelled_laws
 from rig.worlds.hidden.design import DESIGNS, draw_plan
 from rig.worlds.hidden.effect import Drawn, Effect, Form, Unsuited
 from rig.worlds.hidden.gap import rms, structural_gap
@@ -31,7 +31,7 @@ _LEAST_MIXTURE = 4.0  # structural gap over noise in which two effects can both 
 _TRIES = 60  # of plan and effect until the size asked for is physical
 
 FORMS: dict[str, tuple[Form, ...]] = (
-    joint_laws.FORMS | outer_laws.FORMS | channel_laws.FORMS | strange_laws.FORMS
+    joint_laws.FORMS | outer_laws.FORMS | channel_laws.FORMS | unmodelled_laws.FORMS
 )
 
 

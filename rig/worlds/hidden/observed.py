@@ -109,7 +109,7 @@ class Observed:
         )
 
 
-def look(scene: Scene, changes: list[Change], noise_mm: float) -> Observed:
+def noise_free_observation(scene: Scene, changes: list[Change], noise_mm: float) -> Observed:
     """The case without noise. `noise_mm`: rms of what is random in the displacement."""
     kept = _kept(scene)
     full = observe_path(scene, changes)

@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.worlds.arm import place
-from rig.worlds.hidden.observed import Bounds, Observed, look, nuisances
+from rig.worlds.hidden.observed import Bounds, Observed, noise_free_observation, nuisances
 from rig.worlds.hidden.scene import Change, Scene
 from rig.worlds.hidden.textbook import FORMS, Explanation
 from rig.worlds.hidden.words import EFFECTS
@@ -33,7 +33,7 @@ def left_over(
 
     `word` is the true one. What lies above the limit of acceptance is a lower bound.
     """
-    seen = look(scene, changes, noise_mm)
+    seen = noise_free_observation(scene, changes, noise_mm)
     base, bounds = nuisances(seen)
     q = np.array([scene.plan.poses[s.pose] for s in scene.plan.setups])[seen.setup]
     simulated = seen.joints(seen.pushed(seen.force))
