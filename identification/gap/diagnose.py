@@ -39,7 +39,8 @@ from identification.gap.recording.force_scatter import with_observed_force_noise
 from identification.gap.recording.glitches import without_glitches
 from identification.gap.recording.lost_contact import without_lost_contact
 from identification.gap.recording.ramps import with_ramps_marked
-from identification.gap.search.overshoots import Overshoots, by_one_word, overshoots_of_best
+from identification.gap.search.overshoot_paths import Overshoots
+from identification.gap.search.overshoots import by_one_word, overshoots_of_best
 from identification.gap.search.refine import refine
 from identification.gap.search.search import search, with_forced_words
 from identification.gap.search.unmodelled_running import troubles_of, with_plain_trouble

@@ -11,7 +11,8 @@ import pytest
 from identification.arrays import Flags
 from identification.gap.answer.result import GapResult
 from identification.gap.judging.heldout import ALWAYS_IN, folds, held_out, stated_prediction
-from identification.gap.search.overshoots import Overshoots, Paths, brought_to
+from identification.gap.search.overshoot_paths import Overshoots, Paths
+from identification.gap.search.overshoots import brought_to
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import (
     DESIGNS,

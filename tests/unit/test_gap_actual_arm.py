@@ -29,7 +29,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import TO_ACTUAL_BENCH, Variant
 from identification.gap.search.mechanisms_refit import refit_mechanism_variants
-from identification.gap.search.overshoots import _Columns
+from identification.gap.search.overshoot_paths import _Columns
 from identification.gap.search.search import search
 from identification.gap.search.springs_refit import relinearised_variants
 from identification.gap.words import IN_JOINTS, UNMODELLED

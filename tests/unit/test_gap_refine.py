@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from identification.gap.search import refine as room
-from identification.gap.search.overshoots import Overshoots, _unlike, _worth
+from identification.gap.search.overshoot_paths import Overshoots
+from identification.gap.search.overshoots import _unlike, _worth
 
 
 @pytest.mark.parametrize(
