@@ -23,6 +23,7 @@ from identification.gap.answer.found_notes import (
     springs_far_off,
 )
 from identification.gap.answer.gear_side import read_elsewhere
+from identification.gap.answer.known import knowing
 from identification.gap.answer.locate import Where, locate
 from identification.gap.answer.notes import FAULT, Note, notes_of, ordered
 from identification.gap.answer.posterior import Known
@@ -174,16 +175,22 @@ def result_of(
 
 
 def _as_written(engine: Engine, fitted: Fit) -> float | None:
-    """rms (m) that springs and effects alone leave which last: without tares, gains, the scatter of
-    runs, and what drifts or jumps in this session. The datum is the laser's."""
-    bench, base, n = engine.bench, engine.base, engine.bench.rows.n
+    """rms (m) that a simulation with the springs as fitted, and with those effects that last, would
+    leave as it is given: without tares, gains, the scatter of runs, and what drifts or jumps in
+    this session. None without an arm, and of another simulator's curves."""
+    bench, n = engine.bench, engine.bench.rows.n
     if not bench.data.arm or bench.data.curves is not None:
         return None
-    kept = [i for name in ("spring", "geometry", "datum", "known") for i in base.index(name)]
-    gives = bench.response - engine.target[:n] + base.columns[:n, kept] @ fitted.base[kept]
+    softer = engine.base.softer(fitted.base, bench.data.joints)
+    gives = bench.slope_of(bench.compliance * (1 + softer)) * bench.load
     last = [lasting(describe(bench, p, *fitted.of(i))) for i, p in enumerate(fitted.parts)]
-    gives = gives + sum((realise(bench, form, last)[:n] for form in last), np.zeros(n))
-    return sample_rms(bench, gives)
+    last = [form for form in last if form.law.terms]
+    if last and bench.imposed:
+        gives = gives + sum((realise(bench, form, last)[:n] for form in last), np.zeros(n))
+    elif last:
+        with_them = knowing(bench, last).known
+        gives = gives + (0.0 if with_them is None else with_them.does[:n])
+    return sample_rms(bench, gives + (0.0 if bench.known is None else bench.known.does[:n]))
 
 
 def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> GapPattern | None:
