@@ -43,6 +43,8 @@ def with_effect(design: str, v: Variant, stacked: Array, bench: Bench) -> GapDat
     data, rows = linear(design), bench.rows
     count = rows.weight.astype(int)
     response = np.repeat(stacked[: rows.n], count)
+    if v.word == "thermal_drift" and bench.imposed:  # no datum takes what was there at first
+        response = response - response[np.unique(data.setup, return_index=True)[1]][data.setup]
     if v.word == "force_drift" and not bench.imposed:  # in the readings, not in the rig
         slope = np.repeat(np.maximum(bench.slope, 1e-300), count)
         return replace(data, force=data.force - response / slope)

@@ -91,8 +91,14 @@ def test_heat_does_not_jump_and_laws_are_families(word: str, counts: bool) -> No
     assert prior_conflict(engine, odd, 0.0) == pytest.approx(FAR if counts else 0.0)
 
 
-@pytest.mark.parametrize(("largest", "stands_out"), [(3.0, True), (0.9, False)])
-def test_no_single_step_of_a_warming_path_stands_out(largest: float, stands_out: bool) -> None:
+@pytest.mark.parametrize(
+    ("largest", "next_to", "stands_out"),
+    [(3.0, -0.3, True), (0.9, -0.3, False), (3.0, 1.2, False), (3.0, -1.0, True)],
+)
+def test_no_single_step_of_a_warming_path_stands_out(
+    largest: float, next_to: float, stands_out: bool
+) -> None:
+    """Steps that get smaller one by one are no jump; one that turns back is."""
     bench, variants, _ = of("thermal_drift", "rich")
     engine = quick_engine(bench)
     v = next(v for v in variants if v.label == "winding path")
@@ -100,7 +106,7 @@ def test_no_single_step_of_a_warming_path_stands_out(largest: float, stands_out:
     seen = np.any(engine.columns(v.columns)[: bench.rows.n] != 0, axis=0)
     pulls = np.zeros(len(found.pulls))
     pulls[len(found.base) :] = np.where(np.arange(len(seen)) % 2, 0.3, -0.3) * seen
-    pulls[len(found.base) + int(np.flatnonzero(seen)[4])] = largest
+    pulls[len(found.base) + np.flatnonzero(seen)[[4, 5]]] = largest, next_to
     odd = replace(
         found,
         pulls=pulls,

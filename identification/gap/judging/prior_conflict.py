@@ -184,9 +184,10 @@ def _of_heat(engine: Engine, fitted: Fit) -> Array:
     out = [np.zeros(0)]
     for i, part in enumerate(fitted.parts):
         if part.word == "thermal_drift":
-            out.append(np.abs(fitted.pulls_of(i)))
+            pulls = fitted.pulls_of(i)
+            out.append(np.abs(pulls))
             if part.variant.free_pieces:
-                jumps = _jumps(engine, part, out[-1]) * LIMIT / JUMP
+                jumps = _jumps(engine, part, pulls) * LIMIT / JUMP
                 out.append(jumps * _of_the_gap(engine, fitted.contribution(engine, i)))
     return np.concatenate(out)
 
@@ -199,21 +200,25 @@ def _of_the_gap(engine: Engine, contribution: Array) -> float:
 
 
 def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:
-    """The largest step (paths,) of every free path against its other ones, by the normal deviate
-    that is as seldom: where steps are of one size, however large, none stands out. A steady path
-    comes with a place and a rate; steps are what it turns by."""
+    """The largest step (paths,) of every free path against its other ones, and the next to it that
+    goes the same way, by the normal deviate that is as seldom: where steps are of one size, however
+    large, or get smaller one by one, none stands out. A steady path comes with a place and a rate;
+    steps are what it turns by, and a jump turns it there and back. pulls: of all paths."""
     from scipy.special import ndtri, stdtr
 
     pieces, first = part.variant.free_pieces, 2 * part.variant.steady
     seen = np.any(engine.columns(part.variant.columns)[: engine.bench.rows.n] != 0, axis=0)
     out = []
     for steps, there in zip(pulls.reshape(-1, pieces), seen.reshape(-1, pieces), strict=True):
-        size = np.sort(steps[first:][there[first:]])
-        if len(size) < _STEPS:
+        taken = steps[first:][there[first:]]
+        if len(taken) < _STEPS:
             continue
-        rest = float(np.sqrt(np.mean(size[:-1] ** 2)))
-        ratio = float(size[-1]) / max(rest, 1e-300)
-        out.append(-ndtri(max(stdtr(len(size) - 1, -ratio), 1e-300)))
+        i = int(np.abs(taken).argmax())
+        rest = float(np.sqrt(np.mean(np.delete(taken, i) ** 2)))
+        beside = (np.sign(taken[i]) * taken)[max(i - 1, 0) : i + 2]
+        next_to = float(np.sort(beside)[-2])  # of itself and one or two neighbours
+        ratio = abs(float(taken[i])) / max(rest, next_to, 1e-300)
+        out.append(-ndtri(max(stdtr(len(taken) - 1, -ratio), 1e-300)))
     return np.array(out)
 
 
