@@ -14,6 +14,7 @@ from identification.arrays import Array
 from identification.gap.data import ZERO, GapData
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import weighed
+from identification.gap.model import encoders
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.encoders import RESTS_RAD, Readings, _beyond, readings_of
@@ -51,6 +52,20 @@ def test_what_readings_of_a_run_and_of_a_setup_have_in_common_is_found(seed: int
     np.testing.assert_allclose(found.one, 1e-5, rtol=0.15)
     assert found.run == pytest.approx(RUN, rel=0.4)
     assert found.setup == pytest.approx(SETUP, rel=0.7)
+
+
+def test_levels_that_were_read_but_once_say_nothing_of_readings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No load but zero is met again; from three readings there nobody tells their noise, from those
+    of all setups one does."""
+    monkeypatch.setattr(encoders, "ENOUGH", 8)
+    design = Design(("P1", "P2"), repetitions=1, steps=4, hold=3)
+    rows = noisy(design)
+    once = rows[(rows["branch"] == "zero") | (rows["time_s"].diff() > 1.5)]
+    read = gap_data(imported(once, meta(design)))
+    assert sorted(np.unique(np.bincount(hold_ids(read)))) == [1, 3]
+    np.testing.assert_allclose(found_in(read).one, 1e-5, rtol=0.6)
 
 
 def test_it_is_none_where_readings_alone_explain_it() -> None:

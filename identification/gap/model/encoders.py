@@ -60,16 +60,19 @@ def _one(data: GapData, rows: Rows, hold: Ints) -> Array:
 
 def _between_repetitions(data: GapData, rows: Rows) -> float | None:
     """Noise of one joint reading from how levels repeat, rad: that of the middle joint, as one may
-    have a trouble of its own. Forces that differ a little are allowed for as simulated."""
-    left, free = _unloaded(data, rows, rows.force), rows.n
-    for group in (rows.level, rows.run):
-        left = left - _means(left, group, np.ones(rows.n))[group]
-        free -= int(group.max()) + 1
-    free += len(np.unique(rows.setup))
+    have a trouble of its own. Forces that differ a little are allowed for as simulated. Of levels
+    that were read but once nothing is left, and they say nothing."""
+    again = np.bincount(rows.level)[rows.level] > 1
+    left, free = _unloaded(data, rows, rows.force)[again], int(again.sum())
+    for ids in (rows.level[again], rows.run[again]):
+        _, group = np.unique(ids, return_inverse=True)
+        left = left - _means(left, group, np.ones(len(left)))[group]
+        free -= int(group.max(initial=-1)) + 1
+    free += len(np.unique(rows.setup[again]))
     if free < ENOUGH:
         return None
-    spread = np.median(np.abs(left) * np.sqrt(rows.weight)[:, None], axis=0) / QUARTILE
-    return float(np.median(spread) * (rows.n / free) ** 0.5)
+    spread = np.median(np.abs(left) * np.sqrt(rows.weight[again])[:, None], axis=0) / QUARTILE
+    return float(np.median(spread) * (len(left) / free) ** 0.5)
 
 
 def _between_runs(data: GapData, rows: Rows, one: Array) -> tuple[float, float]:
