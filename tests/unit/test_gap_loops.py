@@ -17,7 +17,7 @@ from identification.gap.laws.interval import Coefficients, ComplianceChange
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import play
 from identification.gap.model.path import Path
-from identification.gap.recording.loops import lost
+from identification.gap.recording.loops import lost, work_used
 from tests.explained import explained
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_model import survive
@@ -60,6 +60,29 @@ def test_what_a_loop_encloses_is_a_share_of_its_box() -> None:
     first, again = lost(u, SPRING * u + np.where(up, 40.0, 0.0), imposed=True)
     assert first == pytest.approx(40 / 140, abs=0.01)
     assert again == pytest.approx(40 / 140, abs=0.01)
+
+
+def lifted(u: Array, by: float) -> Array:
+    """N: a spring, and as much against the way at any rate."""
+    return np.asarray(SPRING * u + np.where(np.diff(u, prepend=-1.0) >= 0, by, -by))
+
+
+def test_friction_uses_up_work() -> None:
+    """A parallelogram 12 N high along a slope over 100 N, there and back."""
+    u = strokes(3)
+    for by in (6.0, -6.0):
+        used = work_used(u, lifted(u, by), imposed=True)
+        np.testing.assert_allclose(used, 2 * by / (100 + 2 * abs(by)), rtol=0.15)
+
+
+@pytest.mark.parametrize(("by", "verdict"), [(6.0, "joint_hysteresis"), (-6.0, "unknown")])
+def test_no_passive_rig_gives_out_work(by: float, verdict: str) -> None:
+    u = to_and_fro(6)
+    data = recording(u, lifted(u, by))
+    assert (make_bench(data).load_history.gives_out > 0) is (by < 0)
+    found = explained(data)
+    assert found.verdict == verdict
+    assert any("the other way round" in note for note in found.notes) is (by < 0)
 
 
 def test_no_loop_is_made_of_a_pull_or_of_one_cycle() -> None:

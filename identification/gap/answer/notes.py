@@ -37,6 +37,8 @@ def notes_of(bench: Bench, verdict: str) -> Iterator[Note]:
     yield from (Note(ASIDE, text) for text in bench.data.aside)
     yield from (Note(UNDECIDED, text) for text in _undecided(bench))
     yield from (Note(REMARK, text) for text in (*bench.data.notes, *_remarks(bench)))
+    if bench.load_history.gives_out and verdict != "time_lag":
+        yield Note(REMARK, _gives_out(bench.load_history.gives_out))
 
 
 def _faults(bench: Bench) -> Iterator[str]:
@@ -122,6 +124,15 @@ def _remarks(bench: Bench) -> Iterator[str]:
             "The displacement is imposed; at rest the joints bear the force that was read: "
             "displacement is predicted from it."
         )
+
+
+def _gives_out(share: float) -> str:
+    return (
+        "Every loop of force over displacement runs the other way round: it gives out work, "
+        f"{100 * share:.0f} % of the box around it, as nothing does that is only pushed. A force "
+        "that is read late shows it so, a transducer with a hysteresis of its own, or something "
+        "active drives the rig."
+    )
 
 
 def _let_go(snaps: ForceDrops, data: GapData) -> str:

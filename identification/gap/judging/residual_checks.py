@@ -45,6 +45,8 @@ from identification.gap.words import CURVES, FRICTION, LINEAR
 # has made something yield or slide: a snap, a slip, a crack are likelier.
 SNAPS, _FALL, _LOST = 0.1, 0.15, 0.6  # share that is kept; falls, of the range: beyond noise, most
 LET_GO = 1e-8  # share that is kept where forces let go at once: no law does that
+# Share that is kept by what uses up work where every loop gives some out.
+GIVES_OUT, USES_UP = 1e-4, FRICTION | {"joint_backlash", "joint_creep"}
 COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
 BUT_A_LAG = 1e4  # nats against a creep that is but a lag: beyond what any data bring
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
@@ -103,8 +105,12 @@ def reweighted_by_residuals(found: SearchResult) -> SearchResult:
         every = (*found.explanations, *found.unmodelled)
         done |= {e.words: _less_likely(e, BUT_A_LAG) for e in but_lags(engine, every)}
     done |= {e.words: judge(engine, e) for e in _near(found.unmodelled) if e.words not in done}
+    active = engine.bench.load_history.gives_out > 0
     out, unmodelled = (
-        tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
+        tuple(
+            _passive(e) if active else e
+            for e in sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight)
+        )
         for each in (found.explanations, found.unmodelled)
     )
     found = replace(found, explanations=out, unmodelled=unmodelled)
@@ -140,6 +146,16 @@ def _checked_on_arm(engine: Engine, explanation: Explanation) -> Explanation:
     )
     off = most_off(engine, fitted)
     return _unstrained(replace(explanation, log_adequate=good, off=off), asked)
+
+
+def _passive(explanation: Explanation) -> Explanation:
+    """Where loops give out work: with little of its weight if its largest effect uses up work, or
+    one does and nothing is late."""
+    late = "time_lag" in explanation.words
+    asked = {p.word for p in explanation.parts[: 1 if late else None]}
+    if not asked & USES_UP:
+        return explanation
+    return replace(explanation, log_adequate=explanation.log_adequate + log(GIVES_OUT))
 
 
 def _outside(engine: Engine, explanation: Explanation, fitted: Fit) -> float:
