@@ -13,7 +13,7 @@ from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData, Instruments
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part
-from identification.gap.judging.residual_checks import COMES_BACK, _judged
+from identification.gap.judging.residual_checks import COMES_BACK, _checked_armless
 from identification.gap.laws.friction_law import BY_LOAD
 from identification.gap.laws.interval import NOMINAL
 from identification.gap.model.bench import make_bench
@@ -123,12 +123,14 @@ def test_a_channel_that_comes_back_has_not_drifted() -> None:
     assert weights == sorted(weights, reverse=True)
     first = next(e for e in ranked if e.words == {"thermal_drift"})
     drift = replace(first, parts=(Part(library(found.bench, ["force_drift"])[0], 1.0),))
-    judged = _judged(engine, drift)
+    judged = _checked_armless(engine, drift)
     beside = replace(drift, parts=(first.parts[0], *drift.parts), sizes=(2e-5, 1e-5))
-    assert _judged(engine, beside).log_weight == drift.log_weight  # a little of it may be there
+    assert (
+        _checked_armless(engine, beside).log_weight == drift.log_weight
+    )  # a little of it may be there
     assert judged.log_weight == pytest.approx(drift.log_weight - COMES_BACK)
     assert judged.log_adequate == pytest.approx(drift.log_adequate - COMES_BACK)
-    assert _judged(engine, first).log_weight == first.log_weight
+    assert _checked_armless(engine, first).log_weight == first.log_weight
 
 
 def leaf(share: float = 0.1) -> tuple[Array, Array]:

@@ -81,7 +81,7 @@ def test_a_force_that_shows_no_step_is_a_fault(
 def test_noise_of_few_readings_is_said_to_be_that(
     missed: float, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(found_notes, "noise_of", lambda _: 1.0)
+    monkeypatch.setattr(found_notes, "noise_rms", lambda _: 1.0)
     own = missed * np.array([1.0, -1.0, 1.0, 0.01])
     fitted = cast(Fit, SimpleNamespace(missed_responses=lambda _: own))
     engine = cast(Engine, SimpleNamespace(bench=None))

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.gap import diagnose
+from identification.gap import explore
 from identification.gap.answer.forms import Form, describe, lawful
 from identification.gap.answer.known import in_question, is_gone
 from identification.gap.answer.result import GapResult
@@ -143,15 +143,15 @@ def test_all_that_are_in_question_are_tried(
     monkeypatch: pytest.MonkeyPatch, really: tuple[str, ...]
 ) -> None:
     known = [SimpleNamespace(word=w) for w in ("joint_creep", "joint_yield")]
-    monkeypatch.setattr(diagnose, "_prepared", lambda bench, kept, withheld: (kept, ()))
-    monkeypatch.setattr(diagnose, "_searched", lambda kept, _: tuple(f.word for f in kept))
-    monkeypatch.setattr(diagnose, "_with_unseen", lambda found, *_: found)
-    monkeypatch.setattr(diagnose, "in_question", list)
+    monkeypatch.setattr(explore, "prepared", lambda bench, library: (library.known, ()))
+    monkeypatch.setattr(explore, "searched", lambda kept, _: tuple(f.word for f in kept))
+    monkeypatch.setattr(explore, "with_overshoots", lambda found, *_: found)
+    monkeypatch.setattr(explore, "in_question", list)
     monkeypatch.setattr(
-        diagnose, "is_gone", lambda found, again: bool(({*found} - {*again}) & {*really})
+        explore, "is_gone", lambda found, again: bool(({*found} - {*again}) & {*really})
     )
     start = ("joint_creep", "joint_yield")
-    assert diagnose._without_what_is_gone(start, None, known, ())[1] == really  # type: ignore[arg-type]
+    assert explore.without_what_is_gone(start, None, explore.Library(tuple(known)))[1] == really  # type: ignore[arg-type]
 
 
 def test_a_simulation_without_effects_has_none_in_question() -> None:

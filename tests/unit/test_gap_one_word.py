@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap import diagnose
+from identification.gap import explore
 from identification.gap.data import GapData
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
@@ -61,14 +61,14 @@ def test_friction_under_a_hand_is_friction(seed: int) -> None:
 @pytest.mark.slow
 def test_the_word_that_is_right_asks_for_the_loads_that_there_were() -> None:
     data, count = rubbed(0.3)
-    searched = diagnose._searched(*diagnose._prepared(make_bench(data), (), ()))
+    searched = explore.searched(*explore.prepared(make_bench(data), explore.Library()))
     asked = {next(iter(more.words)): more for more in by_one_word(searched)}
     assert abs(asked["joint_hysteresis"].count - count) <= 0.4 * count
 
 
 def test_nobody_asks_where_the_hand_was_calm() -> None:
     data, _ = rubbed(0.0)
-    searched = diagnose._searched(*diagnose._prepared(make_bench(data), (), ()))
+    searched = explore.searched(*explore.prepared(make_bench(data), explore.Library()))
     assert list(by_one_word(searched)) == []
     far = replace(searched, explanations=searched.explanations[1:])
     assert list(by_one_word(far)) == []

@@ -18,7 +18,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, energies
 from identification.gap.explanations.penalties import _same_element
 from identification.gap.explanations.priors import prior_of
-from identification.gap.explanations.verdict import BENCH_DOUBT, discounted
+from identification.gap.explanations.verdict import ARMLESS_DOUBT, discounted
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import make_bench
 from identification.gap.search.unmodelled_shapes import unmodelled_variants
@@ -223,9 +223,9 @@ def test_cracks_under_an_imposed_stroke_are_no_drift_of_it() -> None:
 def test_nobody_is_surer_of_the_unknown_than_of_a_word() -> None:
     doubted = {"joint_yield", "none", "unknown"}
     for word in doubted:
-        sure = discounted({w: float(w == word) for w in doubted}, doubted, BENCH_DOUBT)
+        sure = discounted({w: float(w == word) for w in doubted}, doubted, ARMLESS_DOUBT)
         assert sum(sure.values()) == pytest.approx(1.0)
-        assert sure[word] < 1 - 0.6 * BENCH_DOUBT
+        assert sure[word] < 1 - 0.6 * ARMLESS_DOUBT
 
 
 def approached(travel: float = 2e-3, faster: float = 5.0, n: int = 160) -> tuple[Array, Array]:

@@ -10,8 +10,8 @@ import pytest
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import (
-    OF_A_BENCH,
     REMAINDER,
+    REMAINDER_ARMLESS,
     Explanation,
     SearchResult,
     tolerated_residual,
@@ -85,13 +85,13 @@ def test_laws_of_a_rig_without_an_arm_may_leave_more() -> None:
     arm = replace_bench(plain, replace(bench, data=replace(bench.data, arm=True)))
     large, left = 9.0 * plain.structural, plain.structural
     for engine, troubles, most in (
-        (plain, {"joint_creep": large}, OF_A_BENCH * left),
+        (plain, {"joint_creep": large}, REMAINDER_ARMLESS * left),
         (arm, {"joint_creep": large}, REMAINDER * left),
-        (plain, {"force_scale": large, "joint_creep": left}, OF_A_BENCH * large),
-        (plain, {"joint_creep": large, "force_scale": large}, OF_A_BENCH * left),
-        (plain, {"force_scale": 0.1 * left}, OF_A_BENCH * left),
+        (plain, {"force_scale": large, "joint_creep": left}, REMAINDER_ARMLESS * large),
+        (plain, {"joint_creep": large, "force_scale": large}, REMAINDER_ARMLESS * left),
+        (plain, {"force_scale": 0.1 * left}, REMAINDER_ARMLESS * left),
         (arm, {"force_scale": large}, REMAINDER * left),
-        (plain, {}, OF_A_BENCH * left),
+        (plain, {}, REMAINDER_ARMLESS * left),
     ):
         assert tolerated_residual(engine, troubles) == pytest.approx(most)
 

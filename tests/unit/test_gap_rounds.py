@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from identification.gap import diagnose
+from identification.gap import explore
 from identification.gap.words import WORDS
 
 FIRST = "first repetitions"
@@ -26,6 +26,9 @@ def result(
     return SimpleNamespace(explanations=[best], engine=engine, foretells=foretells, unknown=lawless)
 
 
+LIBRARY = explore.Library()
+
+
 class Rounds:
     """Rounds whose searches find the results of a list, at a cost; with all words the same, or
     `whole`; asked: who was."""
@@ -37,15 +40,15 @@ class Rounds:
         self.searched: list[set[str]] = []  # words that were left out
         self._loads = SimpleNamespace(words=frozenset({WORD}), cost=cost)
         self._results, self._last, self._whole = iter(found), None, whole
-        monkeypatch.setattr(diagnose, "predicts_held_out", lambda one: one.foretells)
-        monkeypatch.setattr(diagnose, "first_repetitions", lambda engine: FIRST)
-        monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(()))
+        monkeypatch.setattr(explore, "predicts_held_out", lambda one: one.foretells)
+        monkeypatch.setattr(explore, "first_repetitions", lambda engine: FIRST)
+        monkeypatch.setattr(explore, "by_one_word", lambda one: iter(()))
         monkeypatch.setattr(
-            diagnose,
+            explore,
             "overshoots_of_best",
             lambda one, calibration_rows: self._ask(calibration_rows),
         )
-        monkeypatch.setattr(diagnose, "_along", lambda *args: self._search(set(args[-1])))
+        monkeypatch.setattr(explore, "_along", lambda *args: self._search(set(args[-1].withheld)))
 
     def _ask(self, calibration_rows: str | None) -> Any:
         self.asked.append(calibration_rows)
@@ -63,7 +66,7 @@ def test_where_the_first_repetitions_lead_nowhere_all_are_asked(
 ) -> None:
     start, worse, better = result(0.0, False), result(5.0, False), result(30.0, True)
     rounds = Rounds(monkeypatch, worse, better, result(29.0, True))
-    assert diagnose._with_unseen(start, (), ()) is better
+    assert explore.with_overshoots(start, LIBRARY) is better
     assert rounds.asked == [FIRST, None, None]  # once more of what is foretold, for nothing
 
 
@@ -72,46 +75,46 @@ def test_what_foretells_what_was_not_is_kept_for_less_than_it_costs(
 ) -> None:
     start, mended = result(0.0, False), result(5.0, True)
     Rounds(monkeypatch, mended, result(4.0, True))
-    assert diagnose._with_unseen(start, (), ()) is mended
+    assert explore.with_overshoots(start, LIBRARY) is mended
     rounds = Rounds(monkeypatch, result(-1.0, True), result(-1.0, True))
-    assert diagnose._with_unseen(start, (), ()) is start
+    assert explore.with_overshoots(start, LIBRARY) is start
     assert rounds.asked == [FIRST, None]
 
 
 def test_what_is_foretold_is_searched_once_more_and_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     start, dear, better = result(0.0, True), result(9.0, True), result(11.0, True)
     Rounds(monkeypatch, dear)
-    assert diagnose._with_unseen(start, (), ()) is start
+    assert explore.with_overshoots(start, LIBRARY) is start
     rounds = Rounds(monkeypatch, better)
-    assert diagnose._with_unseen(start, (), ()) is better
+    assert explore.with_overshoots(start, LIBRARY) is better
     assert rounds.asked == [None]
 
 
 def test_rounds_end(monkeypatch: pytest.MonkeyPatch) -> None:
     ever_better = [result(20.0 * i, False) for i in range(1, 9)]
     rounds = Rounds(monkeypatch, *ever_better)
-    assert diagnose._with_unseen(result(0.0, False), (), ()) is ever_better[2]
+    assert explore.with_overshoots(result(0.0, False), LIBRARY) is ever_better[2]
     assert rounds.asked == [FIRST] * 3
 
 
 def test_what_leaves_nothing_and_is_foretold_asks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     rounds = Rounds(monkeypatch)
     start = result(0.0, True, left=0.0)
-    assert diagnose._with_unseen(start, (), ()) is start
+    assert explore.with_overshoots(start, LIBRARY) is start
     assert rounds.asked == []
     rounds = Rounds(monkeypatch, result(-1.0, False), result(-1.0, False))
     start = result(0.0, False, left=0.0)  # it foretells nothing: a hand may be why
-    assert diagnose._with_unseen(start, (), ()) is start
+    assert explore.with_overshoots(start, LIBRARY) is start
     assert rounds.asked == [FIRST, None]
 
 
 def test_no_hand_is_looked_for_where_the_law_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     rounds = Rounds(monkeypatch, result(300.0, True), result(300.0, True))
     far = result(0.0, False, lawless=600.0)
-    assert diagnose._with_unseen(far, (), ()) is far
+    assert explore.with_overshoots(far, LIBRARY) is far
     assert rounds.asked == []
     near = result(0.0, False, lawless=200.0)
-    assert diagnose._with_unseen(near, (), ()).explanations[0].log_weight == 300.0
+    assert explore.with_overshoots(near, LIBRARY).explanations[0].log_weight == 300.0
     assert rounds.asked[0] == FIRST
 
 
@@ -122,7 +125,7 @@ def test_loads_that_hardly_pay_beside_more_than_noise_ask_for_no_more(
     monkeypatch: pytest.MonkeyPatch, gain: float, left: float, rounds: int
 ) -> None:
     made = Rounds(monkeypatch, result(gain, False, left), result(gain, False, left))
-    assert diagnose._with_unseen(result(0.0, False), (), ()).explanations[0].log_weight == gain
+    assert explore.with_overshoots(result(0.0, False), LIBRARY).explanations[0].log_weight == gain
     assert made.asked == [FIRST] * rounds
 
 
@@ -136,7 +139,7 @@ def test_all_words_are_searched_where_those_that_ask_for_loads_nearly_gain_by_th
     for more in (0.0, 50.0):
         whole = result(gain + more, True)
         rounds = Rounds(monkeypatch, result(gain, True), cost=cost, whole=whole)
-        found = diagnose._with_unseen(start := result(0.0, True), (), ())
+        found = explore.with_overshoots(start := result(0.0, True), LIBRARY)
         assert rounds.searched == [set(WORDS) - {WORD}, set()][:searched]
         assert found is (whole if searched == 2 and gain + more > cost else start)
 
@@ -144,10 +147,10 @@ def test_all_words_are_searched_where_those_that_ask_for_loads_nearly_gain_by_th
 def test_what_acts_only_where_a_hand_went_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
     better = result(300.0, True)
     Rounds(monkeypatch, better)
-    assert diagnose._with_unseen(start := result(0.0, True), (), ()) is better
+    assert explore.with_overshoots(start := result(0.0, True), LIBRARY) is better
     Rounds(monkeypatch, better)
-    monkeypatch.setattr(diagnose, "acts_only_after_overshoot", lambda one: one is better)
-    assert diagnose._with_unseen(start, (), ()) is start
+    monkeypatch.setattr(explore, "acts_only_after_overshoot", lambda one: one is better)
+    assert explore.with_overshoots(start, LIBRARY) is start
 
 
 @pytest.mark.parametrize(
@@ -164,16 +167,16 @@ def test_a_word_alone_asks_first_where_it_then_explains_more_than_all_did(
     whole, start = result(41.0, True, left=0.0), result(0.0, True)
     along = dict(zip(words, [result(value, True) for value in by_each], strict=True))
     Rounds(monkeypatch)
-    monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter(loads))
-    monkeypatch.setattr(diagnose, "overshoots_of_best", lambda *_: None)
+    monkeypatch.setattr(explore, "by_one_word", lambda one: iter(loads))
+    monkeypatch.setattr(explore, "overshoots_of_best", lambda *_: None)
     asked = []
 
-    def searched(_: Any, more: Any, known: Any, withheld: set[str]) -> Any:
+    def searched(_: Any, more: Any, library: explore.Library) -> Any:
         asked.append(next(iter(more.words)))
-        return along[asked[-1]] if withheld else whole
+        return along[asked[-1]] if library.withheld else whole
 
-    monkeypatch.setattr(diagnose, "_along", searched)
-    found = diagnose._with_unseen(start, (), ())
+    monkeypatch.setattr(explore, "_along", searched)
+    found = explore.with_overshoots(start, LIBRARY)
     assert found.explanations[0].log_weight == kept
     ahead = words[int(by_each[1] > by_each[0])]
     assert asked == [*words, *([ahead] if kept else [])]
@@ -185,7 +188,9 @@ def test_a_word_alone_that_all_others_do_not_bear_out_is_dropped(
     loads = SimpleNamespace(words=frozenset({WORD}), cost=10.0)
     start = result(0.0, True)
     Rounds(monkeypatch)
-    monkeypatch.setattr(diagnose, "by_one_word", lambda one: iter((loads,)))
-    monkeypatch.setattr(diagnose, "overshoots_of_best", lambda *_: None)
-    monkeypatch.setattr(diagnose, "_along", lambda *given: result(20.0 if given[-1] else 9.0, True))
-    assert diagnose._with_unseen(start, (), ()) is start
+    monkeypatch.setattr(explore, "by_one_word", lambda one: iter((loads,)))
+    monkeypatch.setattr(explore, "overshoots_of_best", lambda *_: None)
+    monkeypatch.setattr(
+        explore, "_along", lambda *given: result(20.0 if given[-1].withheld else 9.0, True)
+    )
+    assert explore.with_overshoots(start, LIBRARY) is start

@@ -14,7 +14,7 @@ from identification.gap.explanations.explanation import (
     LAW_REMAINDER,
 )
 from identification.gap.explanations.verdict import (
-    BENCH_DOUBT,
+    ARMLESS_DOUBT,
     DOUBT,
     EXPLAINED,
     TAKES_MORE,
@@ -215,7 +215,7 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
     variants = library(bench, ["joint_creep"])
     found = search(small_engine_of(bench), variants)
     law, noise = (part("joint_creep", [0]),), bench.noise.stated
-    sure = 1 - 0.5 * BENCH_DOUBT  # on a bench; of two that are doubted, half comes back
+    sure = 1 - 0.5 * ARMLESS_DOUBT  # on a bench; of two that are doubted, half comes back
     shares = (
         (noise, False, None),
         (1.6 * noise, False, None),
@@ -289,9 +289,9 @@ def test_what_is_worth_too_little_for_three_speaks_for_two_of_them() -> None:
         assert with_posterior(fresh, {}).probabilities["joint_yield"] > 0.9
 
 
-@pytest.mark.parametrize(("arm", "most"), [(True, DOUBT), (False, BENCH_DOUBT)])
+@pytest.mark.parametrize(("arm", "most"), [(True, DOUBT), (False, ARMLESS_DOUBT)])
 def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, most: float) -> None:
-    assert BENCH_DOUBT > 4 * DOUBT
+    assert ARMLESS_DOUBT > 4 * DOUBT
     bench = small_bench()
     variants = library(bench, ["joint_creep", "joint_hysteresis"])
     found = search(small_engine_of(bench), variants)

@@ -12,10 +12,10 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint, troubles_named
-from identification.gap.judging.cross_validation import noise_of
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.judging.limit_violation import limit_violation
 from identification.gap.judging.prior_conflict import what_is_strained
+from identification.gap.judging.residuals import noise_rms
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import SWINGS
 from identification.gap.words import BETWEEN_RUNS
@@ -87,7 +87,7 @@ def at_few_readings(engine: Engine, fitted: Fit, after: float) -> tuple[Note, ..
     most of them. after: rms m that is left."""
     bench = engine.bench
     own = fitted.missed_responses(engine)
-    typical, ratio = float(np.median(np.abs(own))), after / noise_of(bench)
+    typical, ratio = float(np.median(np.abs(own))), after / noise_rms(bench)
     if not typical > max(_STANDS_OUT, 2 * ratio):
         return ()
     text = (

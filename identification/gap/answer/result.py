@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from math import log
 
@@ -34,8 +34,8 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, GapPattern, SearchResult
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import find_representative
-from identification.gap.judging.cross_validation import left_of, noise_of, sample_rms
 from identification.gap.judging.heldout import HeldOut, folds, held_out, stated_prediction
+from identification.gap.judging.residuals import noise_rms, residual_rms, sample_rms
 from identification.gap.laws.interval import Parameter
 from identification.gap.model.bench import Bench
 from identification.gap.recording.faults import SIGNS, SILENT
@@ -147,7 +147,7 @@ def result_of(
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
     notes += springs_far_off(engine, fitted) if verdict == "none" else ()
-    after = left_of(engine, fitted)
+    after = residual_rms(engine, fitted)
     notes += [*called(found, chosen, verdict), *left_out(chosen, fuller, after)]
     notes += not_foretold(held, chosen.words)
     notes += at_few_readings(engine, fitted, after) if chosen.parts else ()
@@ -156,7 +156,7 @@ def result_of(
         probabilities=found.probabilities,
         effects=_effects(found, chosen, known),
         where=locate(engine, verdict, fitted, chosen.sizes, structural),
-        noise=noise_of(bench),
+        noise=noise_rms(bench),
         before=sample_rms(bench, simulated),
         after=after,
         held_out=held,
@@ -250,7 +250,9 @@ def _placed(data: GapData, places: dict[str, float]) -> dict[str, float]:
     return {f"direction {sits[p]}": share for p, share in places.items() if several and p in sits}
 
 
-def with_twins(result: GapResult, chosen: Explanation, withheld: set[str]) -> GapResult:
+def with_equivalent_places(
+    result: GapResult, chosen: Explanation, withheld: Collection[str]
+) -> GapResult:
     """Effects that no channel tells from the same law elsewhere share their probability with it,
     openly: between the two only priors and grids would decide. The verdict, which they are together
     the likeliest for, stays the most probable word."""

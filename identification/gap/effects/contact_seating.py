@@ -31,9 +31,9 @@ from identification.gap.model.variants import Variant, variant
 WORD = "contact_seating"
 FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 # A bench has no second direction that would tell a seat from a curved spring: only low forces.
-BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
-BENCH_SLACKS = (0.0007, 0.002, 0.006, 0.02)  # under which what hangs loose comes to bear
-BENCH_SHARES = (0.01, 0.03, 0.1)
+ARMLESS_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
+ARMLESS_SLACKS = (0.0007, 0.002, 0.006, 0.02)  # under which what hangs loose comes to bear
+ARMLESS_SHARES = (0.01, 0.03, 0.1)
 # At low force: a gap of an arm's fixture that closes at nearly half of the load is a knee.
 LATEST = 0.35
 STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, LATEST)  # of it, between which several faces seat
@@ -78,10 +78,10 @@ def variants(bench: Bench) -> list[Variant]:
     top = float(np.abs(bench.load).max())
     if not top > 0 or not (bench.data.arm or bench.load_history.force_keeps_its_sign):
         return []
-    scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
+    scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else ARMLESS_SHARES))
     out: list[Variant] = []
     columns: list[int] = []
-    forces = FORCES if bench.data.arm else BENCH_FORCES
+    forces = FORCES if bench.data.arm else ARMLESS_FORCES
     for share in forces:
         for law in (*SEATED, *(BESIDES if bench.data.arm else ())):
             if law == "slack" and share > LATEST:
@@ -90,7 +90,7 @@ def variants(bench: Bench) -> list[Variant]:
             if law == "exponential":
                 columns += out[-1].columns
     if not bench.data.arm and not bench.imposed:
-        out += [_seated(bench, "slack", share * top, scales) for share in BENCH_SLACKS]
+        out += [_seated(bench, "slack", share * top, scales) for share in ARMLESS_SLACKS]
     # a ball on a plate has no force of its own
     out.append(_seated(bench, "Hertz", HERTZ_AT * top, scales))
     out.append(

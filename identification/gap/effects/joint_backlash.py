@@ -57,7 +57,7 @@ from identification.gap.model.variants import Variant, variant
 
 WORD = "joint_backlash"
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
-_REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow", "sprung")
+_REFINED, _ARMLESS_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow", "sprung")
 SMOOTH = ("soft", "slow", "arctan", "sprung")
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
@@ -192,7 +192,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     kind = found.info["kind"]
     if kind in PLACED:
         return []
-    beside: tuple[str, ...] = _REFINED if bench.data.arm else _BENCH_REFINED
+    beside: tuple[str, ...] = _REFINED if bench.data.arm else _ARMLESS_REFINED
     beside = () if _pressed(bench) else beside
     if found.info["preload_Nm"]:  # straight and soft anywhere else, it is a curve
         beside = tuple(k for k in beside if k != "sprung")

@@ -26,7 +26,7 @@ from identification.uncertainty import TWO_SIDED
 
 WORD = "joint_stiffness_error"
 SCALES = (1.0, 3.0)
-BENCH_SCALES = (3.0, 9.0)
+ARMLESS_SCALES = (3.0, 9.0)
 PAIRS = 2.0  # prior weight of any two joints, against one certain joint alone
 STIFFEST = -0.9  # relative change of what the spring gives (compliance; force, if that answers)
 
@@ -61,7 +61,7 @@ def variants(bench: Bench) -> list[Variant]:
 
 def _of_one(bench: Bench, j: int, column: int) -> Variant:
     beyond = _beyond(float(bench.data.compliance_relative_sd[j]))
-    scales = tuple(beyond * f for f in SCALES) + (() if bench.data.arm else BENCH_SCALES)
+    scales = tuple(beyond * f for f in SCALES) + (() if bench.data.arm else ARMLESS_SCALES)
     # a spring's compliance stays positive: a tenth of what is simulated at least
     least, sign = (0.0, False) if bench.data.arm else (STIFFEST, True)
     return variant(

@@ -42,7 +42,7 @@ from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain. Laws of other people's rigs are
 # known less well: what explains four fifths of a gap's square there is its main cause.
-REMAINDER, OF_A_BENCH = 0.25, 0.45
+REMAINDER, REMAINDER_ARMLESS = 0.25, 0.45
 _SOFT = 8.0  # how fast, per factor e beyond a limit, weight is lost to `unknown`
 # Nor can a law be met better than to a few percent of what it does, where that is no more than such
 # a share of the gap: effects that cancel each other explain nothing.
@@ -207,7 +207,7 @@ def tolerated_residual(engine: Engine, troubles: Mapping[str, float]) -> float:
     if engine.bench.data.arm:
         return REMAINDER * engine.structural
     word, size = next(iter(troubles.items()), ("", 0.0))
-    return OF_A_BENCH * max(engine.structural, size if word in LINEAR else 0.0)
+    return REMAINDER_ARMLESS * max(engine.structural, size if word in LINEAR else 0.0)
 
 
 def soft_limit(value: float, limit: float) -> float:

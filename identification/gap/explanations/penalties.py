@@ -64,7 +64,7 @@ def cancelling(engine: Engine, parts: tuple[Part, ...], found: Sizes, sizes: Arr
     bent = [float(s) for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR]
     arm = engine.bench.data.arm
     linear = _taken_back(parts, found) if arm else 0.0  # of a bench the sizes say it already
-    if arm and len(bent) < _TWO:
+    if arm and len(bent) < 2:
         return linear
     share = max(max(bent, default=0.0) / max(engine.structural, 1e-300), 1e-6)
     return linear + _wall(share / CANCELLING)
@@ -73,15 +73,12 @@ def cancelling(engine: Engine, parts: tuple[Part, ...], found: Sizes, sizes: Arr
 def _taken_back(parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats, a steep wall, for linear effects of which hardly anything is left."""
     moved = [float(m) for p, m in zip(parts, found.moved, strict=True) if p.word in LINEAR]
-    if len(moved) < _TWO:
+    if len(moved) < 2:
         return 0.0
     return _wall(_LEFT * max(moved) / max(found.linear, 1e-300))
 
 
 _LEFT = 0.3  # of what the larger one moves
-
-
-_TWO = 2  # to take each other back
 
 
 def _wall(beyond: float) -> float:

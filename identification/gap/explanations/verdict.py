@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import LAW_REMAINDER, Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
+from identification.gap.explanations.priors import before_data
 from identification.gap.model.noise import UNSURE
-from identification.gap.words import LINEAR, WORDS
+from identification.gap.words import LINEAR, NEED_ARM, WORDS
 
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.12
@@ -20,7 +21,7 @@ TEMPER = 0.12
 # sets of others; on other people's rigs that nobody had seen before much fewer are, `none` and
 # `unknown` no oftener than the others (counts in docs/gap.md): the families are not all that nature
 # has, and the posterior does not know that.
-DOUBT, BENCH_DOUBT = 0.03, 0.2
+DOUBT, ARMLESS_DOUBT = 0.03, 0.2
 
 
 def discounted(probabilities: dict[str, float], doubted: set[str], most: float) -> dict[str, float]:
@@ -82,12 +83,23 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
     total = sum(mass.values())
     doubted, doubt = set(found.alone), DOUBT
     if not found.engine.bench.data.arm:
-        doubted, doubt = doubted | {"none", "unknown"}, BENCH_DOUBT
+        doubted, doubt = doubted | {"none", "unknown"}, ARMLESS_DOUBT
     probabilities = discounted({w: m / total for w, m in mass.items()}, doubted, doubt)
     best = next((e for e in ranked if e.parts), None)
     if arm and best is not None:
         probabilities = with_a_lead(probabilities, _main(best, ranked, arm))
     return replace(found, probabilities=probabilities, kept=kept)
+
+
+def as_before_data(found: SearchResult, withheld: Collection[str]) -> SearchResult:
+    """With the probabilities before any data where nothing moved, and no effect, a drift for
+    instance, is seen: that nothing is missing then is no finding. withheld: words that the library
+    was without."""
+    likeliest = max(found.probabilities, key=lambda w: found.probabilities[w])
+    if likeliest != "none" or not found.engine.bench.still:
+        return found
+    absent = set(withheld) if found.engine.bench.data.arm else NEED_ARM | set(withheld)
+    return replace(found, probabilities=before_data(set(WORDS) - absent))
 
 
 # Of 307 verdicts `unknown` above 0.9 on arms 280 were right, on test sets of others 97 of 115; of
@@ -169,7 +181,7 @@ def simpler_of(
     """With an effect less, where that explains nearly as much, and the springs and gains are about
     what was stated: of three effects two; of an arm's two the one."""
     e, many = explanation, len(explanation.words)
-    if many < (_TWO if arm else _MANY):
+    if many < (2 if arm else _MANY):
         return None
     most = TAKES_MORE if many >= _MANY or e.words <= LINEAR else TAKES_TWO
     if many >= _MANY:
@@ -188,7 +200,7 @@ def simpler_of(
     return next(near, None)
 
 
-_TWO, _MANY = 2, 3
+_MANY = 3
 
 
 def find_representative(

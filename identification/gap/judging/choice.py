@@ -39,7 +39,6 @@ CLOSELY = 2.0
 # And a force that drifts is named where the force without load shows it, beyond so many standard
 # deviations (rms): there is no law there that could be off.
 SHOWN_WITHOUT_LOAD = 3.0
-_TWO = 2
 
 
 class Choice(NamedTuple):
@@ -107,7 +106,7 @@ def _too_small(explanation: Explanation) -> list[str]:
     ones may be what other linear ones lack: no such law bends. A jump of the datum shows without
     load, where no law but a drift's is off; and it has no law that could be off under load."""
     sizes = explanation.rms_by_word
-    share = LEAST_SHARE if len(sizes) <= _TWO else LEAST_OF_THIRD
+    share = LEAST_SHARE if len(sizes) <= 2 else LEAST_OF_THIRD
     out = []
     for word, size in sorted(sizes.items(), key=lambda i: i[1]):
         if word in DATUM_JUMPS:
@@ -139,7 +138,7 @@ def _worth(explanation: Explanation, fewer: Explanation, *, arm: bool) -> float:
     """Nats that the effect has to bring that the one has and the other one, with fewer, has not."""
     if arm and explanation.words - fewer.words <= FLANKS and flanks_of_one_joint(explanation):
         return WORTH_OF_FLANK
-    return WORTH if len(explanation.words) <= _TWO else WORTH_OF_THIRD
+    return WORTH if len(explanation.words) <= 2 else WORTH_OF_THIRD
 
 
 def passes_validation(found: SearchResult, explanation: Explanation) -> bool:

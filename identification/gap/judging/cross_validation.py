@@ -10,18 +10,17 @@ the other one is freedom of its law, and it speaks for both.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array, Ints
+from identification.arrays import Ints
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult, soft_limit
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.priors import before_data
 from identification.gap.explanations.verdict import PASSES_ABOVE, passed_validation, with_posterior
 from identification.gap.judging.heldout import folds, held_out
+from identification.gap.judging.residuals import noise_rms, residual_rms
 from identification.gap.judging.unread_ramps import unread_ramp_error
 from identification.gap.model.bench import Bench
 from identification.gap.words import (
@@ -30,8 +29,6 @@ from identification.gap.words import (
     FRICTION,
     LATE,
     LINEAR,
-    NEED_ARM,
-    WORDS,
 )
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
@@ -69,16 +66,6 @@ def predicts_held_out(found: SearchResult) -> bool:
     return fold is None or not best.parts or _kept(found, best, fold) > PASSES_ABOVE
 
 
-def learned(found: SearchResult, withheld: Collection[str]) -> SearchResult:
-    """As before any data where nothing moved, and no effect, a drift for instance, is seen: that
-    nothing is missing then is no finding. withheld: words that the library was without."""
-    likeliest = max(found.probabilities, key=lambda w: found.probabilities[w])
-    if likeliest != "none" or not found.engine.bench.still:
-        return found
-    absent = set(withheld) if found.engine.bench.data.arm else NEED_ARM | set(withheld)
-    return replace(found, probabilities=before_data(set(WORDS) - absent))
-
-
 def _comes_again(bench: Bench) -> bool:
     """Of a rig without an arm, whether what is withheld is met elsewhere too: the end of one pull
     nothing foretells."""
@@ -96,7 +83,7 @@ def _foretold(found: SearchResult, name: str, fold: Ints) -> dict[frozenset[str]
     is the larger one, another has to be plainly better to speak for both."""
     first, out = found.explanations[0].log_weight, {}
     pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
-    for both in (e for e in pairs if len(e.words) == _TWO):
+    for both in (e for e in pairs if len(e.words) == 2):
         drifts = both.parts[0].word in BETWEEN_RUNS
         most = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
         rubs = found.engine.bench.load_history.one_rate and both.words & FRICTION
@@ -112,7 +99,7 @@ def _foretold(found: SearchResult, name: str, fold: Ints) -> dict[frozenset[str]
     return out
 
 
-_TWO, _PAIRS, _NEAR = 2, 3, 25.0  # so many of the best, and nats below the first, are looked at
+_PAIRS, _NEAR = 3, 25.0  # so many of the best, and nats below the first, are looked at
 _BETTER, _PLAINLY, _ALIKE = 0.98, 0.5, 1.1
 
 
@@ -147,7 +134,7 @@ def _kept(found: SearchResult, explanation: Explanation, fold: Ints) -> float:
     after = held_out(engine, explanation, "repetition", fold, loose).after
     seen = CLOSED * _moved(engine, fitted)
     unseen = engine.bench.rows.rms(unread_ramp_error(engine, fitted))
-    limit = max(FAILS * noise_of(engine.bench), float(np.hypot(seen, unseen)))
+    limit = max(FAILS * noise_rms(engine.bench), float(np.hypot(seen, unseen)))
     return soft_limit(after, limit)
 
 
@@ -156,30 +143,10 @@ def _own_tips(engine: Engine, explanation: Explanation, fitted: Fit) -> bool:
     across shows and no other run foretells, and nothing else is left."""
     if engine.bench.data.arm or not all(p.variant.own_tips for p in explanation.parts):
         return False
-    return left_of(engine, fitted) < FAILS * noise_of(engine.bench)
+    return residual_rms(engine, fitted) < FAILS * noise_rms(engine.bench)
 
 
 def _moved(engine: Engine, fitted: Fit) -> float:
     """rms (m) of what the effects that are no linear laws move, at least the gap's structure."""
     moved = fitted.together(engine, {p.word for p in fitted.parts} - LINEAR)
     return max(engine.structural, engine.bench.rows.rms_about_means(moved))
-
-
-def noise_of(bench: Bench) -> float:
-    """rms that the instruments alone would leave in single samples, m."""
-    noise, weight = bench.noise, bench.rows.weight
-    count = np.ones(bench.rows.n) if bench.rows.continuous else weight
-    square = noise.response**2 * count + noise.hold**2 + noise.run**2
-    return float(np.sqrt(weight @ square / weight.sum()))
-
-
-def left_of(engine: Engine, fitted: Fit) -> float:
-    """rms (m) over samples that a fit leaves."""
-    return sample_rms(engine.bench, fitted.whole(engine))
-
-
-def sample_rms(bench: Bench, predicted: Array) -> float:
-    """rms (m) over samples by which the response misses what was predicted of the rows (n,): that
-    of the rows, and of the samples within them."""
-    weight, left = bench.rows.weight, bench.response - predicted
-    return float(np.sqrt(weight @ (left**2 + bench.scatter_about(predicted)) / weight.sum()))

@@ -27,7 +27,7 @@ from identification.gap.judging.residuals import excess_response_rms
 _TINY = 1e-300
 # How well shapes meet a mechanism at best, of what it does: of arms, and of rigs that nobody built
 # to be measured; of these, also of the largest coefficient.
-_MET, _MET_OF_A_BENCH, _EACH = 0.03, 0.04, 0.05
+_MET, _MET_ARMLESS, _EACH = 0.03, 0.04, 0.05
 _FAR, _MISSES = 5.5, 0.06  # standard deviations; of the gap that springs leave
 
 
@@ -37,7 +37,7 @@ def limit_violation(engine: Engine, explanation: Explanation, fitted: Fit) -> tu
     where they are, or by what is missed there of the gap, all else fitted anew, whichever is less.
     Laws count as no better met than they are, by what the fit leaves too: thousands of readings
     tell more than they mean, and what one law lacks others make up for."""
-    met = _MET if engine.bench.data.arm else _MET_OF_A_BENCH
+    met = _MET if engine.bench.data.arm else _MET_ARMLESS
     met *= max(explanation.sizes, default=0.0)
     eta = max(explanation.eta, met, excess_response_rms(engine, fitted))
     looser = fit(engine, replace(explanation, eta=eta), alike=True)

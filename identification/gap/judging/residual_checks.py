@@ -29,13 +29,17 @@ from identification.gap.explanations.verdict import (
     tolerated_misfit,
     with_posterior,
 )
-from identification.gap.judging.cross_validation import noise_of, sample_rms
 from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.late import but_lags
 from identification.gap.judging.limit_violation import limit_violation
 from identification.gap.judging.paths import is_implausible_drift
 from identification.gap.judging.prior_conflict import LIMIT, most_off, prior_conflict
-from identification.gap.judging.residuals import excess_joint_reading_rms, excess_response_rms
+from identification.gap.judging.residuals import (
+    excess_joint_reading_rms,
+    excess_response_rms,
+    noise_rms,
+    sample_rms,
+)
 from identification.gap.judging.stated import led_by_springs
 from identification.gap.judging.unread_ramps import unread_ramp_error
 from identification.gap.model.noise import UNSURE
@@ -72,7 +76,7 @@ def reweighted_by_residuals(found: SearchResult) -> SearchResult:
             replace(e, log_adequate=e.log_adequate + log(FAULTY)) for e in found.explanations
         ]
         return with_posterior(replace(found, explanations=tuple(doubted)), found.kept)
-    judge = _checked_on_arm if engine.bench.data.arm else _judged
+    judge = _checked_on_arm if engine.bench.data.arm else _checked_armless
     first = _near(found.explanations)
     done = {e.words: judge(engine, e) for e in first if e.parts}
     for none in (e for e in first if not e.parts):
@@ -81,7 +85,7 @@ def reweighted_by_residuals(found: SearchResult) -> SearchResult:
         if not engine.bench.data.arm:  # nothing is wrong while springs and gains are as stated
             share = soft_limit(off, AS_STATED)
             less = _less_likely(none, -float(np.log(max(share, 1e-300))))
-            if sample_rms(engine.bench, fitted.whole(engine)) > SWINGS * noise_of(engine.bench):
+            if sample_rms(engine.bench, fitted.whole(engine)) > SWINGS * noise_rms(engine.bench):
                 less = replace(less, log_adequate=less.log_adequate + log(FAULTY))
             done[none.words] = less
             continue
@@ -192,7 +196,7 @@ def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int
     return float(max(remainder / words**0.5, law, unseen))
 
 
-def _judged(engine: Engine, explanation: Explanation) -> Explanation:
+def _checked_armless(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     course = engine.bench.load_history
     if explanation.parts[0].word == _WANDERING[course.wanders]:

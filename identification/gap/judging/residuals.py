@@ -1,12 +1,34 @@
-"""What a fit leaves beyond the noise of the channels."""
+"""What a fit leaves, and what of it is beyond the noise of the channels."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import Fit
 from identification.gap.judging.unread_ramps import unread_ramp_error
+from identification.gap.model.bench import Bench
+
+
+def noise_rms(bench: Bench) -> float:
+    """rms that the instruments alone would leave in single samples, m."""
+    noise, weight = bench.noise, bench.rows.weight
+    count = np.ones(bench.rows.n) if bench.rows.continuous else weight
+    square = noise.response**2 * count + noise.hold**2 + noise.run**2
+    return float(np.sqrt(weight @ square / weight.sum()))
+
+
+def residual_rms(engine: Engine, fitted: Fit) -> float:
+    """rms (m) over samples that a fit leaves."""
+    return sample_rms(engine.bench, fitted.whole(engine))
+
+
+def sample_rms(bench: Bench, predicted: Array) -> float:
+    """rms (m) over samples by which the response misses what was predicted of the rows (n,): that
+    of the rows, and of the samples within them."""
+    weight, left = bench.rows.weight, bench.response - predicted
+    return float(np.sqrt(weight @ (left**2 + bench.scatter_about(predicted)) / weight.sum()))
 
 
 def excess_response_rms(engine: Engine, fitted: Fit) -> float:

@@ -16,13 +16,13 @@ from identification.gap.model.variants import Variant, variant
 from identification.uncertainty import TWO_SIDED
 
 SCALES = (0.03, 0.08, 0.2)
-_BENCH_SCALE = 0.6  # excitations and ranges are set wrong on rigs without an arm
+_ARMLESS_SCALE = 0.6  # excitations and ranges are set wrong on rigs without an arm
 _BENDS = np.diag([1.0, 0.08])  # at full range, of what the gain is off
 
 
 def _scales(bench: Bench) -> tuple[float, ...]:
     """Of a gain that is the same all over the range."""
-    return SCALES if bench.data.arm else (*SCALES, _BENCH_SCALE)
+    return SCALES if bench.data.arm else (*SCALES, _ARMLESS_SCALE)
 
 
 def straight_and_bent(

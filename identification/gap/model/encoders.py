@@ -96,7 +96,7 @@ def _of_zeros(data: GapData, rows: Rows, q: Array, one: Array) -> tuple[float, f
     """The same of readings q (n, m) rad, of which each scatters by one (m,)."""
     zero = rows.zero
     runs, of_run = np.unique(rows.run[zero], return_inverse=True)
-    if len(runs) < _TWO:
+    if len(runs) < 2:
         return 0.0, 0.0
     weight = np.bincount(of_run, rows.weight[zero])
     means = _means(q[zero], of_run, rows.weight[zero])
@@ -108,9 +108,6 @@ def _of_zeros(data: GapData, rows: Rows, q: Array, one: Array) -> tuple[float, f
     pose = np.array([poses.index(p) for p in poses])
     between = _beyond(_means(means, of_setup, known), pose, 1 / np.bincount(of_setup, known), one)
     return run**0.5, between**0.5
-
-
-_TWO = 2
 
 
 def _means(values: Array, group: Ints, weight: Array) -> Array:

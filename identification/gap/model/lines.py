@@ -45,7 +45,7 @@ def force_without_load(rows: Rows, noise: float, *, tared: bool) -> Array:
     for part in np.unique(each):
         mine = np.flatnonzero(each == part)
         plateaus = _plateaus(rows, mine)
-        if len(plateaus) < _TWO or rows.zero[mine].all():
+        if len(plateaus) < 2 or rows.zero[mine].all():
             continue
         time, force, weight = (np.array(v) for v in zip(*plateaus, strict=True))
         sd = noise * float(np.sqrt(1 / weight[force.argmin()] + 1 / weight[force.argmax()]))
@@ -61,9 +61,6 @@ def force_without_load(rows: Rows, noise: float, *, tared: bool) -> Array:
             )
         out[mine] = np.interp(rows.session[mine], time, force)
     return out
-
-
-_TWO = 2
 
 
 def _plateaus(rows: Rows, mine: Ints) -> list[tuple[float, float, float]]:

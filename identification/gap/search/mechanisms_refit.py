@@ -26,7 +26,7 @@ def refit_mechanism_variants(engine: Engine, explanation: Explanation) -> list[V
     pool of the bench holds their columns afterwards. None where nothing changes these."""
     bench, parts = engine.bench, explanation.parts
     mine = [p for p in parts if p.word in _ANSWERS]
-    if len(parts) != _TWO or len(mine) != 1 or not explanation.eta > 0 or not bench.data.arm:
+    if len(parts) != 2 or len(mine) != 1 or not explanation.eta > 0 or not bench.data.arm:
         return []
     other = next(p for p in parts if p is not mine[0])
     if bench.imposed or other.word not in EFFECTS:
@@ -41,7 +41,6 @@ def refit_mechanism_variants(engine: Engine, explanation: Explanation) -> list[V
     return [v.known_by(_WHERE, **{TO_ACTUAL_BENCH: stands, ANSWERS_TO: other.word}) for v in found]
 
 
-_TWO = 2
 _ANSWERS = IN_JOINTS | {base_slip.WORD, base_compliance.WORD}
 _WHERE = ", on the arm as it stands"
 

@@ -42,7 +42,7 @@ _PROMISING = 7  # further words of an explanation that are looked at closely
 # Explanations around which another effect is looked for. Of an arm, further ones cost a fifth of
 # the time and change no verdict in 300 cases; on a bench the two that belong together may both look
 # poor alone, where the spring is wrong as well.
-_SEEDS, _BENCH_SEEDS = 4, 6
+_SEEDS, _ARMLESS_SEEDS = 4, 6
 _READING = 6  # explanations whose instruments are looked at beside what else moves
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
@@ -63,7 +63,7 @@ def search(
     none = _as_stated(engine)
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
-    seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
+    seeds = _SEEDS if engine.bench.data.arm else _ARMLESS_SEEDS
     singly = _seeds(pool, seeds)
     near = _near(pool, singly)
     front, alone_best = _in_more_joints(engine, all_of_them, pool, near), _best(pool)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from identification.arrays import Array, Flags
-from identification.gap.effects.contact_seating import BENCH_SLACKS, pressed
+from identification.gap.effects.contact_seating import ARMLESS_SLACKS, pressed
 from identification.gap.evidence.factor import span_of
 from identification.gap.explanations.explanation import PLAIN, GapPattern, SearchResult
 from identification.gap.laws.drift import free_path, path_root
@@ -191,7 +191,9 @@ def _loose(bench: Bench) -> Array:
     if bench.imposed:
         return np.empty((bench.rows.n, 0))
     size, sign = pressed(bench)
-    return np.column_stack([sign * np.minimum(size / (s * size.max()), 1.0) for s in BENCH_SLACKS])
+    return np.column_stack(
+        [sign * np.minimum(size / (s * size.max()), 1.0) for s in ARMLESS_SLACKS]
+    )
 
 
 def _just_turned(bench: Bench) -> Flags:
