@@ -25,7 +25,14 @@ from rig.measured_meta import measured_meta
 from rig.panel.onlooker import Onlooker
 from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
-from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
+from rig.procedure.devices import (
+    Devices,
+    make_devices,
+    make_loader,
+    open_devices,
+    refuse_emulators,
+    station_clock,
+)
 from rig.procedure.limits import UNLOAD
 from rig.procedure.pace import Pace, speed_named
 from rig.procedure.progress import Progress, read_progress
@@ -199,6 +206,7 @@ def _opened(
         clock = station_clock(station)
         devices = make_devices(station, clock)
         open_devices(devices, stack, say, onlooker.device)
+        refuse_emulators(station, devices)
         loader = make_loader(station, clock)
         scripted = station.operator.driver == "scripted"
         if scripted:

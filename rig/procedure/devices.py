@@ -43,6 +43,28 @@ def open_devices(
         say(f"{device.name}: ready ({in_short(device.identity())})")
 
 
+# Where a device says what it is; its address may be called anything.
+_NAMING = ("model", "device", "serial_number", "daq_product_type", "info")
+
+
+def refuse_emulators(station: Station, devices: Devices) -> None:
+    """InputError where a device of a station that is no emulated one calls itself an emulator: its
+    data would bear the origin of measured ones."""
+    if station.emulation is not None:
+        return
+    for device in devices.all():
+        identity = device.identity()
+        for key in _NAMING:
+            if "emulat" in identity.get(key, "").lower():
+                name = key.replace("_", " ")
+                raise InputError(
+                    f"{station.path}: the {device.name} calls itself emulated ({name} "
+                    f'"{identity[key]}"), and the station has no emulation: section, so its data '
+                    "would be marked as measured. Give the address of the real device, or take "
+                    "--station emulated."
+                )
+
+
 # What an operator wants to see of a device on one line; the data set keeps everything.
 _TELLING = (
     "model",

@@ -40,6 +40,7 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
         "emulated_rig": lambda station, _protocol, _before: nullcontext(station),
         "make_devices": lambda *_: None,
         "open_devices": lambda *_: None,
+        "refuse_emulators": lambda *_: None,
         "make_loader": lambda *_: loader,
         "LoaderWithBar": lambda inner, *_: inner,
     }
