@@ -86,9 +86,11 @@ def measure(
     station = station_for(protocol_file, protocol.station, station_name)
     if speed is not None:
         station = _at_speed(station, speed)
-    plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
+    planned = plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
     _check_output(path)
+    for warning in planned.warnings:
+        say(f"Warning: {warning}")
     start: dict[str, object] = {
         "uuid": str(uuid.uuid4()),
         "origin": "emulated" if station.emulation else "measured",

@@ -151,9 +151,12 @@ def plan(protocol: MeasurementProtocol, station: Station | None = None) -> Plan:
     warnings: list[str] = []
     errors: list[tuple[Key, str]] = list(beyond_joints(protocol, arm))
     for n, run in enumerate(runs):
-        for share, what, remedy in shares(protocol, run, arm, station):
-            if share > 1:
+        for share, refused, what, remedy in shares(protocol, run, arm, station):
+            if share > refused:
                 errors.append((("runs", n), f"{what}. {remedy}"))
+            elif share > 1:
+                beyond = f"{100 * (share - 1):.0f} % too much, unless the arm is stiffer"
+                warnings.append(f"{name_of(run)}: {what}: {beyond}. {remedy}")
             elif share > 1 - MARGIN:
                 warnings.append(f"{name_of(run)}: {what}: {100 * (1 - share):.0f} % to spare.")
         warnings += limit_warnings(protocol, run, station)
