@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import uuid
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +13,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from drivers.clock import Clock
-from drivers.errors import DeviceError
+from drivers.errors import DeviceError, SafetyStop
 from drivers.interfaces import Loader
 from rig import dataset as datasets
 from rig.digits import counted
@@ -43,7 +42,7 @@ from rig.resuming import interrupted, resumed
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, parse_station, station_for
-from rig.storage.files import check_ending, check_folder
+from rig.storage.files import check_ending, check_folder, check_writable
 from rig.terminal import leave_lost_terminal
 
 if TYPE_CHECKING:
@@ -169,10 +168,7 @@ def _check_output(path: Path) -> None:
             "Choose another name with -o, or go on with an interrupted one by --resume."
         )
     check_folder(path)
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(
-            f"{path}: nothing may be written into the folder {path.parent}. Choose another with -o."
-        )
+    check_writable(path)
 
 
 @dataclass(frozen=True)
@@ -303,7 +299,8 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
         reason = str(error)
         recorder.event("device_failed", reason, device=error.device)
         # Fault and remedy follow as the command's last word, once the data are safe.
-        rig.loader.notify(f"The {error.device} has failed. {UNLOAD}", "error")
+        what = "stopped for safety" if isinstance(error, SafetyStop) else "failed"
+        rig.loader.notify(f"The {error.device} has {what}. {UNLOAD}", "error")
         raise
     except KeyboardInterrupt:
         reason = "interrupted"

@@ -286,9 +286,9 @@ class Supervision:
         for breach in breaches:
             if breach.action == "stop":
                 self._recorder.event("limit", breach.text, action="stop")
-                text = f"{breach.text}; the measurement is stopped. {UNLOAD}"
-                self._loader.notify(text, "error")
-                raise MeasurementStopped(text)
+                # The limit follows as the command's last word, once the data are safe.
+                self._loader.notify(f"Stopped at a limit of {breach.quantity}. {UNLOAD}", "error")
+                raise MeasurementStopped(f"{breach.text}; the measurement is stopped. {UNLOAD}")
 
     def _on_breach(self, breach: Breach) -> None:
         if breach.action == "pause" and not self._prompts and not self._paused:

@@ -39,7 +39,9 @@ def test_the_force_limit_stops_keeps_and_tells(bench: Bench) -> None:
     message = "force 150 N is above the limit of 100 N; the measurement is stopped. Turn the screw"
     with pytest.raises(MeasurementStopped, match=message):
         bench.run()
-    assert bench.loader.said[-1].startswith("force 150 N is above the limit of 100 N")
+    assert bench.loader.said[-1] == (
+        "Stopped at a limit of force. Turn the screw back until it no longer touches the arm."
+    )
     assert len(bench.records("sample")) > 5
 
 
