@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from drivers.clock import Clock
 from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Loader, Robot
 from rig.errors import InputError
-from rig.station import Station
+from rig.station import Station, incomplete
 from rig.storage.columns import unit_of
 
 
@@ -106,11 +106,7 @@ def make_devices(station: Station, clock: Clock) -> Devices:
     from drivers.ur10e.client import Ur10e
 
     if station.robot is None or station.dynamometer is None or station.laser is None:
-        names = [n for n in ("robot", "dynamometer", "laser") if getattr(station, n) is None]
-        raise InputError(
-            f"{station.path}: the station has no {', '.join(names)}; "
-            "measuring needs robot, dynamometer and laser. Add the section to the file."
-        )
+        raise incomplete(station)
     emulated = station.emulation is not None
     return Devices(
         robot=Ur10e(station.robot, clock, emulated),

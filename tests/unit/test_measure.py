@@ -32,6 +32,20 @@ from tests.unit.runner_bench import Bench, at
 PROTOCOL = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
 
 
+def test_a_station_without_a_device_says_what_to_add(tmp_path: Path) -> None:
+    station = tmp_path / "half.yaml"
+    text = load_station("ur10e_lab").text
+    laser = text[text.index("\nlaser:") : text.index("\noperator:")]
+    robot = text[text.index("\nrobot:") : text.index("\ndynamometer:")]
+    station.write_text(text.replace(laser, "").replace(robot, ""))
+    with pytest.raises(InputError) as caught:
+        measure.measure(PROTOCOL, str(station), tmp_path / "x.h5", print)
+    assert str(caught.value) == (
+        f"{station}: the station has no robot and no laser; measuring needs robot, dynamometer and "
+        "laser. Add `robot:` and `laser:` as in protocols/stations/ur10e_lab.yaml."
+    )
+
+
 def test_what_must_be_read_is_said_before_the_screen_moves(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

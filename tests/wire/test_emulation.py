@@ -244,8 +244,15 @@ def test_unknown_faults_name_the_known(rig: EmulatedRig) -> None:
 
 def test_an_unknown_scheduled_fault_is_refused_at_the_start() -> None:
     fault = FaultPlan(device="robot", kind="melted", after_s=3.0)
+    given = station(faults=(fault,))
     with pytest.raises(InputError, match=r'emulation\.faults\[0\]: the robot has no fault "melt'):
-        EmulatedRig(station(faults=(fault,))).start()
+        EmulatedRig(given).start()
+    written = "faults: [{device: robot, kind: melted, after_s: 3}]"
+    text = given.text.replace("faults: []", written)
+    line = 1 + text[: text.index("kind: melted")].count("\n")
+    place = re.escape(f"{given.path}:{line}:") + r"\d+: emulation\.faults\[0\]: "
+    with pytest.raises(InputError, match=place):
+        EmulatedRig(replace(given, text=text)).start()
 
 
 def test_an_unknown_world_is_refused_at_the_start() -> None:
