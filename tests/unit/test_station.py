@@ -20,7 +20,7 @@ LAB = (STATIONS / "ur10e_lab.yaml").read_text("utf-8")
 
 
 def said(text: str, *changes: tuple[str, str]) -> list[str]:
-    """Problems of a changed station, the file's name and place left out, and what is checked later."""
+    """Problems of a changed station, without file, place and what is checked later."""
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
