@@ -13,7 +13,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from drivers.clock import Clock
-from drivers.errors import DeviceError, SafetyStop
+from drivers.errors import DeviceError
 from drivers.interfaces import Loader
 from rig import dataset as datasets
 from rig.digits import counted
@@ -26,6 +26,7 @@ from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.devices import (
     Devices,
+    failed,
     make_devices,
     make_loader,
     open_devices,
@@ -298,9 +299,7 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     except DeviceError as error:
         reason = str(error)
         recorder.event("device_failed", reason, device=error.device)
-        # Fault and remedy follow as the command's last word, once the data are safe.
-        what = "stopped for safety" if isinstance(error, SafetyStop) else "failed"
-        rig.loader.notify(f"The {error.device} has {what}. {UNLOAD}", "error")
+        rig.loader.notify(failed(error), "error")
         raise
     except KeyboardInterrupt:
         reason = "interrupted"

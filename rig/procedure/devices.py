@@ -7,8 +7,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from drivers.clock import Clock
+from drivers.errors import DeviceError, SafetyStop
 from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Loader, Robot
 from rig.errors import InputError
+from rig.procedure.limits import UNLOAD
 from rig.station import Station, incomplete
 from rig.storage.columns import unit_of
 
@@ -92,6 +94,13 @@ def _told(key: str, value: str) -> str:
     unit = unit_of(key)
     name = key.removesuffix(f"_{unit}").replace("_", " ")
     return f"{name} {value} {unit}".rstrip()
+
+
+def failed(error: DeviceError) -> str:
+    """What is said at once; fault and remedy follow as the command's last word, once the data are
+    safe."""
+    what = "stopped for safety" if isinstance(error, SafetyStop) else "failed"
+    return f"The {error.device} has {what}. {UNLOAD}"
 
 
 def station_clock(station: Station) -> Clock:
