@@ -96,6 +96,8 @@ class DisplacementSensor(Device, Protocol):
     range_mm: float
 
 
+WITHDRAWN = "(withdrawn)"  # what `Loader.ask` returns for a question that was taken back
+
 Command = Literal["pause", "redo_step", "redo_repetition", "skip", "abort"]
 
 
@@ -183,7 +185,11 @@ class Loader(Protocol):
         """Who turns the screw, and its pitch."""
 
     def ask(self, prompt: Prompt) -> str:
-        """Blocks until one of `prompt.answers` is given, and returns it."""
+        """Blocks until one of `prompt.answers` is given, and returns it, or until `withdraw`."""
+
+    def withdraw(self) -> None:
+        """Takes the open question back: its `ask` returns WITHDRAWN. Without one, or where whoever
+        is asked answers at once by himself, nothing happens."""
 
     def guide(self, view: LiveView) -> None:
         """Shows where the force is and where it should go; returns at once."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import uuid
 from collections.abc import Callable, Iterator, Mapping
@@ -25,7 +24,15 @@ from rig.measured_meta import measured_meta
 from rig.panel.onlooker import Onlooker
 from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
-from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
+from rig.procedure.devices import (
+    Devices,
+    failed,
+    make_devices,
+    make_loader,
+    open_devices,
+    refuse_emulators,
+    station_clock,
+)
 from rig.procedure.limits import UNLOAD
 from rig.procedure.pace import Pace, speed_named
 from rig.procedure.progress import Progress, read_progress
@@ -36,7 +43,7 @@ from rig.resuming import interrupted, resumed
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, parse_station, station_for
-from rig.storage.files import check_ending, check_folder
+from rig.storage.files import check_ending, check_folder, check_writable
 from rig.terminal import leave_lost_terminal
 
 if TYPE_CHECKING:
@@ -79,9 +86,11 @@ def measure(
     station = station_for(protocol_file, protocol.station, station_name)
     if speed is not None:
         station = _at_speed(station, speed)
-    plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
+    planned = plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
     _check_output(path)
+    for warning in planned.warnings:
+        say(f"Warning: {warning}")
     start: dict[str, object] = {
         "uuid": str(uuid.uuid4()),
         "origin": "emulated" if station.emulation else "measured",
@@ -160,10 +169,7 @@ def _check_output(path: Path) -> None:
             "Choose another name with -o, or go on with an interrupted one by --resume."
         )
     check_folder(path)
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(
-            f"{path}: nothing may be written into the folder {path.parent}. Choose another with -o."
-        )
+    check_writable(path)
 
 
 @dataclass(frozen=True)
@@ -199,6 +205,7 @@ def _opened(
         clock = station_clock(station)
         devices = make_devices(station, clock)
         open_devices(devices, stack, say, onlooker.device)
+        refuse_emulators(station, devices)
         loader = make_loader(station, clock)
         scripted = station.operator.driver == "scripted"
         if scripted:
@@ -292,8 +299,7 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     except DeviceError as error:
         reason = str(error)
         recorder.event("device_failed", reason, device=error.device)
-        # Fault and remedy follow as the command's last word, once the data are safe.
-        rig.loader.notify(f"The {error.device} has failed. {UNLOAD}", "error")
+        rig.loader.notify(failed(error), "error")
         raise
     except KeyboardInterrupt:
         reason = "interrupted"

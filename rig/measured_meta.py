@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from rig.errors import InputError
 from rig.meta import (
     DisplacementInstrument,
     ForceInstrument,
@@ -13,13 +12,13 @@ from rig.meta import (
 )
 from rig.models.robot import load_robot
 from rig.protocol import MeasurementProtocol
-from rig.station import Station
+from rig.station import Station, incomplete
 
 
 def measured_meta(protocol: MeasurementProtocol, station: Station) -> Meta:
     """The simulation is the arm's model file: what was believed before this measurement."""
     if station.dynamometer is None or station.laser is None:
-        raise InputError(f"{station.path}: measuring needs dynamometer and laser.")
+        raise incomplete(station)
     arm = load_robot(protocol.robot)
     force, laser = station.dynamometer, station.laser
     c1, c2, c3, c4, c5, c6 = (float(k) for k in arm.joint_stiffness)

@@ -151,11 +151,11 @@ def plan(protocol: MeasurementProtocol, station: Station | None = None) -> Plan:
     warnings: list[str] = []
     errors: list[tuple[Key, str]] = list(beyond_joints(protocol, arm))
     for n, run in enumerate(runs):
-        for share, what, remedy in shares(protocol, run, arm, station):
-            if share > 1:
+        for share, refused, what, remedy in shares(protocol, run, arm, station):
+            if share > refused:
                 errors.append((("runs", n), f"{what}. {remedy}"))
             elif share > 1 - MARGIN:
-                warnings.append(f"{name_of(run)}: {what}: {100 * (1 - share):.0f} % to spare.")
+                warnings.append(f"{name_of(run)}: {what}: {_close(share, remedy)}")
         warnings += limit_warnings(protocol, run, station)
         warnings += soft_warnings(protocol, n, run, arm, station)
     _refuse(protocol, errors)
@@ -178,6 +178,13 @@ def plan(protocol: MeasurementProtocol, station: Station | None = None) -> Plan:
         assumptions=tuple(_assumptions(protocol, arm, mounts, emulated)),
         warnings=tuple(warnings),
     )
+
+
+def _close(share: float, remedy: str) -> str:
+    """How near to what is allowed, or how far beyond where only a stiffer arm stays within."""
+    if share <= 1:
+        return f"{100 * (1 - share):.0f} % to spare."
+    return f"{100 * (share - 1):.0f} % too much, unless the arm is stiffer. {remedy}"
 
 
 # --- one run -------------------------------------------------------------------------------------

@@ -23,17 +23,17 @@ QUASI_STATIC_S = 1000.0
 
 def shares(
     protocol: MeasurementProtocol, run: PlannedRun, arm: Arm, station: Station | None
-) -> Iterator[tuple[float, str, str]]:
-    """(share of what is allowed, in words, what to do when it is above 1)."""
+) -> Iterator[tuple[float, float, str, str]]:
+    """(share of what is allowed, share from which on it is refused, in words, what to do then)."""
     for i in range(6):
         hold, limit = abs(run.hold_torque_Nm[i]), run.torque_limit_Nm[i]
         what = f"joint {i + 1} holds {hold:.0f} Nm at {run.forces_N[-1]:g} N, allowed {limit:g} Nm"
-        yield hold / limit, what, "Lower the top force, or choose a pose with a shorter lever."
+        yield hold / limit, 1.0, what, "Lower the top force, or choose a pose with a shorter lever."
     yield from _displacement_shares(protocol, run, arm, station)
     for axis, part, allowed in _full_scales(run, station):
         force = part * run.forces_N[-1]
         what = f"the dynamometer's {axis} carries {force:.4g} N, full scale {allowed:g} N"
-        yield force / allowed, what, "Set a larger range at the amplifier and in the station."
+        yield force / allowed, 1.0, what, "Set a larger range at the amplifier and in the station."
 
 
 def _full_scales(run: PlannedRun, station: Station | None) -> Iterator[tuple[str, float, float]]:
@@ -84,16 +84,13 @@ def soft_warnings(
 
 def _displacement_shares(
     protocol: MeasurementProtocol, run: PlannedRun, arm: Arm, station: Station | None
-) -> Iterator[tuple[float, str, str]]:
+) -> Iterator[tuple[float, float, str, str]]:
     u = run.displacement_mm
     stiffer = 1 + 2 * float(np.max(arm.joint_stiffness_relative_sd))
     for name, allowed in _displacement_limits(protocol, station):
         what = f"about {u:.2g} mm expected at {run.forces_N[-1]:g} N, {name} is {allowed:g} mm"
-        share = u / allowed
         # Nominal springs are uncertain: only what even a much stiffer arm exceeds is an error.
-        if 1 < share <= stiffer:
-            share = 1.0
-        yield share, what, "Lower the top force, or give stop_at_displacement_mm."
+        yield u / allowed, stiffer, what, "Lower the top force, or give stop_at_displacement_mm."
 
 
 def _displacement_limits(

@@ -11,6 +11,7 @@ from math import degrees, isnan, nan, radians
 
 from drivers.errors import NotDischarged, NotWanted
 from drivers.interfaces import Loader, Prompt
+from drivers.readings import Reading
 from rig.errors import MeasurementStopped
 from rig.plan import TARE_S
 from rig.procedure.acquisition import Acquisition
@@ -54,9 +55,11 @@ class Runner:
         self._supervision = Supervision(
             acquisition, loader, recorder, Watch(protocol.limits), checkpoint, protocol.repetitions
         )
-        self._steps = StepProcedure(protocol, self._supervision, recorder, loader)
+        self._unloaded = progress.unloaded
+        self._steps = StepProcedure(protocol, self._supervision, recorder, loader, self._unloaded)
         self._mounted: tuple[str, str] | None = None
         self._segment = progress.segment
+        self._datum_segment = 0  # in which the datum was set
 
     def interrupt(self) -> None:
         """Ctrl-C: the first asks, the second stops at once (raises KeyboardInterrupt), and so does
@@ -110,6 +113,28 @@ class Runner:
         self._unload()
         self._steps.event(where, "unloaded", "screw turned back")
         self._steps.zero_plateau(where, self._protocol.zero.after_s)
+        self._question_the_tare(where)
+
+    def _question_the_tare(self, where: Where) -> None:
+        """What was zeroed under load shows only now that the load is gone."""
+        fallen = self._unloaded.tared_under_load()
+        if fallen is None:
+            return
+        force_N, moved_mm = fallen
+        text = (
+            f"Repetition {where.repetition} seems to have been tared while the screw still pressed:"
+            f" unloaded, the force stands {force_N:.3g} N and the displacement {moved_mm:.3g} mm "
+            "below their zeros, in the ratio of the loading curve. Its levels are that much too "
+            "low. Redo the repetition, with the screw clear of the arm when it is tared."
+        )
+        self._steps.event(where, "tared_under_load", text)
+        prompt = Prompt("tared_under_load", text, ("record", "redo_repetition", "abort"))
+        answer = self._supervision.ask(prompt)
+        if answer == "redo_repetition" and self._datum_segment == where.segment:
+            self._recorder.datum_mm = nan
+        self._supervision.obey(answer)
+        kept = f"Repetition {where.repetition}, which seems to have been tared under load, is kept."
+        self._loader.notify(kept, "warning")
 
     def _rest(self) -> None:
         self._supervision.show(phase="rest")
@@ -235,20 +260,50 @@ class Runner:
     def _zeroed(self, where: Where) -> Where:
         """Unload, reset and operate the amplifier, tare, set the datum of a new setup."""
         self._supervision.show(phase="taring", step=0, target_N=0.0, band_N=0.0)
-        self._unload()
-        self._reset()
-        self._operate()
-        _, force, laser = self._acquisition.average(TARE_S)
+        while True:
+            self._unload()
+            self._reset()
+            self._operate()
+            _, force, laser = self._acquisition.average(TARE_S)
+            if self._clear(where, laser):
+                break
         self._devices.dynamometer.tare(force)
+        self._segment += 1
         if isnan(self._recorder.datum_mm):
-            self._recorder.datum_mm = laser.values[0]
+            self._recorder.datum_mm, self._datum_segment = laser.values[0], self._segment
         self._acquisition.average(0.0)  # what was read before taring is no force
         self._supervision.restart()
-        self._segment += 1
         where = replace(where, start_s=self._supervision.now(), segment=self._segment)
-        data = {"datum_mm": self._recorder.datum_mm, "segment": self._segment}
+        data = {
+            "datum_mm": self._recorder.datum_mm,
+            "laser_mm": laser.values[0],
+            "segment": self._segment,
+        }
         self._steps.event(where, "tared", "amplifier reset, force tared", **data)
+        self._unloaded.tared((where.run.pose, where.run.direction), laser.values[0])
         return where
+
+    def _clear(self, where: Where, laser: Reading) -> bool:
+        """False where the operator, asked about an arm that stands as if under load, sees that it
+        is. A screw that presses and an arm that has given way look alike to the laser."""
+        run = where.run
+        off = self._unloaded.off((run.pose, run.direction), laser, run.forces_N)
+        if off is None:
+            return True
+        text = (
+            f"The laser shows the arm {off[0]:.3g} mm from where it last stood unloaded, as under "
+            f"about {off[1]:.3g} N. What is zeroed under load spoils the repetition. Is the screw "
+            "clear of the arm? (It is clear, too, where the arm has slipped or given way, or the "
+            "laser was moved.)"
+        )
+        self._steps.event(where, "unloaded_elsewhere", text)
+        prompt = Prompt("screw_clear", text, ("clear", "touching", "abort"))
+        answer = self._supervision.ask(prompt, watching=False)
+        self._supervision.obey(answer)
+        if answer == "clear":
+            words = f"Zeroed {off[0]:.3g} mm from where the arm last stood unloaded."
+            self._loader.notify(words, "warning")
+        return answer == "clear"
 
     def _reset(self) -> None:
         """By the line, or by the operator's hand: a switch that was not turned is asked for again,

@@ -112,6 +112,16 @@ def _where(protocol_file: Path) -> str:
         return name
 
 
+def incomplete(station: Station) -> InputError:
+    """What to raise where a device is missing that measuring needs."""
+    lacking = [n for n in ("robot", "dynamometer", "laser") if getattr(station, n) is None]
+    sections = " and ".join(f"`{name}:`" for name in lacking)
+    return InputError(
+        f"{station.path}: the station has no {' and no '.join(lacking)}; measuring needs robot, "
+        f"dynamometer and laser. Add {sections} as in protocols/stations/ur10e_lab.yaml."
+    )
+
+
 def parse_station(text: str, path: Path) -> Station:
     """As `load_station`, for the text of a station that `path` (a data set) holds."""
     return _built(read_document_text(text, str(path), StationFile, _check), path)

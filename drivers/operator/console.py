@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from drivers.clock import Clock
 from drivers.errors import DeviceError
-from drivers.interfaces import Command, LiveView, Prompt
+from drivers.interfaces import WITHDRAWN, Command, LiveView, Prompt
 from drivers.operator.keys import Keys
 from drivers.operator.settings import OperatorSettings
 
@@ -167,6 +167,10 @@ class ConsoleOperator:
             if self._question is not None:
                 self._question.answer = answer
                 self._question.answered.set()
+
+    def withdraw(self) -> None:
+        """Takes the open question off the screen."""
+        self.answer(WITHDRAWN)
 
     def guide(self, view: LiveView) -> None:
         """Shows the view."""

@@ -101,6 +101,9 @@ class ScriptedOperator:
             self._screw().request(amplifier=prompt.key)
         return answer
 
+    def withdraw(self) -> None:
+        """Nothing: the answer is under way."""
+
     def guide(self, view: LiveView) -> None:
         """Turns the screw a little when it is time to."""
         with self._lock:

@@ -6,9 +6,16 @@ of them leaves them narrow. All facts, doubtful or not, are in the report's chap
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from rig.analysis.quality import STILL, Recorded, slots_missed, unsettled_levels, zeros_of
+from rig.analysis.quality import (
+    STILL,
+    Recorded,
+    RunZeros,
+    slots_missed,
+    unsettled_levels,
+    zeros_of,
+)
 from rig.digits import number
 
 _MOST_MISSED = 0.1  # of the sampling slots
@@ -16,7 +23,13 @@ _MOST_MISSED = 0.1  # of the sampling slots
 
 def doubts(dataset: Recorded) -> tuple[str, ...]:
     """One sentence each; none for a recording that went as it should."""
-    return (*_missed(dataset), *_unsettled(dataset), *_zero_moved(dataset))
+    zeros = zeros_of(dataset)
+    return (
+        *_missed(dataset),
+        *_unsettled(dataset),
+        *_tared_under_load(zeros),
+        *_zero_moved([run for run in zeros if not run.under_load]),
+    )
 
 
 def _missed(dataset: Recorded) -> Iterator[str]:
@@ -42,9 +55,29 @@ def _unsettled(dataset: Recorded) -> Iterator[str]:
         )
 
 
-def _zero_moved(dataset: Recorded) -> Iterator[str]:
+def _tared_under_load(zeros: Iterable[RunZeros]) -> Iterator[str]:
+    """One sentence a repetition: what stands in its levels is no drift."""
+    for run in zeros:
+        if run.under_load:
+            first, last = run.plateaus[0], run.plateaus[-1]
+            yield (
+                f"{_place(run)} seems to have been tared while the screw still pressed: unloaded, "
+                f"force and displacement stood {number(abs(last.force - first.force), 3)} N and "
+                f"{number(abs(last.displacement - first.displacement), 3)} mm below their zeros, "
+                "in the ratio of the loading curve. A straight line over time is taken off the "
+                "force, but this was no drift: its levels and k are wrong. Measure it again, with "
+                "the screw clear of the arm when it is tared."
+            )
+
+
+def _place(run: RunZeros) -> str:
+    where = " ".join(filter(None, (run.pose, run.direction)))
+    return f"Repetition {run.repetition} ({where})"
+
+
+def _zero_moved(zeros: Iterable[RunZeros]) -> Iterator[str]:
     """Of the run in which the force at zero load moved most, in relation to what it measured."""
-    runs = [r for r in zeros_of(dataset) if r.change_N is not None and r.span_N > 0]
+    runs = [r for r in zeros if r.change_N is not None and r.span_N > 0]
     worst = max(runs, key=lambda r: abs(r.change_N or 0.0) / r.span_N, default=None)
     if worst is None or worst.change_N is None:
         return

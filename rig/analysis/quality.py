@@ -14,6 +14,7 @@ from identification.running import first_rows
 from rig.arrays import Array
 from rig.dataset import Dataset
 from rig.measurements import Measurements
+from rig.zeroing import tared_under_load
 
 # What an operator or a device did that a reader of the results should know.
 NOTABLE = (
@@ -30,8 +31,10 @@ NOTABLE = (
     "resumed",
     "step_left_out",
     "stopped",
+    "tared_under_load",
     "top",
     "touched",
+    "unloaded_elsewhere",
     "values_lost",
 )
 MOST_EVENTS = 40
@@ -62,6 +65,7 @@ class RunZeros:
     """The zero-load holds of one run, in the order of measurement.
 
     span_N: between the largest and the smallest force of the run; 0 if it holds no load.
+    under_load: it looks as if it was tared while the screw still pressed.
     """
 
     pose: str
@@ -69,6 +73,7 @@ class RunZeros:
     repetition: int
     plateaus: tuple[Plateau, ...]
     span_N: float = 0.0
+    under_load: bool = False
 
     @property
     def change_N(self) -> float | None:
@@ -227,7 +232,18 @@ def _zeros(dataset: Recorded) -> Iterator[RunZeros]:
         known = tuple(p for p in plateaus if p is not None)
         if known:
             pose, direction, repetition = (p[first] for p in place)
-            yield RunZeros(str(pose), str(direction), int(repetition), known, span)
+            under_load = _under_load(dataset, mine[~zero], known)
+            yield RunZeros(str(pose), str(direction), int(repetition), known, span, under_load)
+
+
+def _under_load(dataset: Recorded, loaded: NDArray[np.intp], plateaus: tuple[Plateau, ...]) -> bool:
+    """loaded: rows (n,) of the run that are no zero-load hold."""
+    force = dataset.columns["force_N"][loaded].astype(float)
+    moved = dataset.columns["displacement_mm"][loaded].astype(float)
+    good = np.isfinite(force) & np.isfinite(moved)
+    pairs = list(zip(force[good].tolist(), moved[good].tolist(), strict=True))
+    before, after = ((p.force, p.displacement) for p in (plateaus[0], plateaus[-1]))
+    return tared_under_load(before, pairs, after)
 
 
 def _span(force: NDArray[Any]) -> float:

@@ -11,6 +11,7 @@ from rig.errors import InputError, did_you_mean
 from rig.worlds import make_world
 from rig.worlds.scene import WorldScene
 from rig.worlds.world import ZERO_PLATEAU_S
+from rig.yaml.yamlfile import place_in_text
 
 if TYPE_CHECKING:
     from drivers.operator.screw import ScrewServer
@@ -113,8 +114,9 @@ class EmulationHost:
 
     def _check_schedule(self, faults: Sequence[FaultPlan]) -> None:
         for number, fault in enumerate(faults):
-            place = f"{self.station.path}: emulation.faults[{number}]"
-            self._check(fault.device, fault.kind, place)
+            key = ("emulation", "faults", number, "kind")
+            line = place_in_text(self.station.text, str(self.station.path), key)
+            self._check(fault.device, fault.kind, f"{line}: emulation.faults[{number}]")
 
     def _fault_by_message(self, message: object) -> object:
         """As the screw's port wants it: a ValueError becomes the reply."""

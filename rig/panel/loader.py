@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Literal, Protocol, runtime_checkable
 
 from drivers.errors import DeviceError
-from drivers.interfaces import Command, LiveView, Loader, Prompt
+from drivers.interfaces import WITHDRAWN, Command, LiveView, Loader, Prompt
 from rig.errors import MeasurementStopped
 from rig.panel.panel import Panel, Question
 from rig.procedure.limits import UNLOAD
@@ -44,6 +44,7 @@ class PanelLoader:
         self._join_until = 0.0
         self._closed = threading.Event()
         self._mourned = False
+        self._question: Question | None = None
 
     def open(self) -> None:
         """Opens the loader; says what an emulated run waits for."""
@@ -88,14 +89,22 @@ class PanelLoader:
 
     def ask(self, prompt: Prompt) -> str:
         """The first answer, from wherever. Raises MeasurementStopped when the page says abort."""
-        question = self._panel.ask(prompt)
+        question = self._question = self._panel.ask(prompt)
         try:
             answer = self._by_script(question) if self._scripted else self._by_console(question)
         finally:
+            self._question = None
             self._panel.withdraw(question)
         if question.aborted:
             raise MeasurementStopped(f"the operator ended the measurement. {UNLOAD}")
         return answer
+
+    def withdraw(self) -> None:
+        """Takes the open question back, from both places."""
+        question = self._question
+        if question is not None and not question.done.is_set():
+            question.answer = WITHDRAWN
+            question.done.set()
 
     def _by_script(self, question: Question) -> str:
         prompt = question.prompt
@@ -106,7 +115,7 @@ class PanelLoader:
             return ""
         if question.answer is None:
             return self._loader.ask(prompt)
-        if prompt.key in MANUAL_WORK:
+        if prompt.key in MANUAL_WORK and question.answer != WITHDRAWN:
             self._loader.ask(prompt)
         return question.answer
 

@@ -41,8 +41,10 @@ SILENT_EVENTS = (
     "repetition_done",
     "step_left_out",
     "stopped",
+    "tared_under_load",
     "top",
     "touched",
+    "unloaded_elsewhere",
 )
 WISHES = 8  # commands that wait to be heard; more is somebody hammering on a button
 INVALID_REMEDY = "One is no harm; when it goes on, see the table of faults for this device."

@@ -52,6 +52,8 @@ LABELS = {
     "move": "Move the arm",
     "check again": "Check again",
     "accept": "Accept this pose",
+    "clear": "It is clear",
+    "touching": "It touches: turn it back",
 }
 
 

@@ -7,9 +7,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from drivers.clock import Clock
+from drivers.errors import DeviceError, SafetyStop
 from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Loader, Robot
 from rig.errors import InputError
-from rig.station import Station
+from rig.procedure.limits import UNLOAD
+from rig.station import Station, incomplete
 from rig.storage.columns import unit_of
 
 
@@ -43,6 +45,28 @@ def open_devices(
         say(f"{device.name}: ready ({in_short(device.identity())})")
 
 
+# Where a device says what it is; its address may be called anything.
+_NAMING = ("model", "device", "serial_number", "daq_product_type", "info")
+
+
+def refuse_emulators(station: Station, devices: Devices) -> None:
+    """InputError where a device of a station that is no emulated one calls itself an emulator: its
+    data would bear the origin of measured ones."""
+    if station.emulation is not None:
+        return
+    for device in devices.all():
+        identity = device.identity()
+        for key in _NAMING:
+            if "emulat" in identity.get(key, "").lower():
+                name = key.replace("_", " ")
+                raise InputError(
+                    f"{station.path}: the {device.name} calls itself emulated ({name} "
+                    f'"{identity[key]}"), and the station has no emulation: section, so its data '
+                    "would be marked as measured. Give the address of the real device, or take "
+                    "--station emulated."
+                )
+
+
 # What an operator wants to see of a device on one line; the data set keeps everything.
 _TELLING = (
     "model",
@@ -72,6 +96,13 @@ def _told(key: str, value: str) -> str:
     return f"{name} {value} {unit}".rstrip()
 
 
+def failed(error: DeviceError) -> str:
+    """What is said at once; fault and remedy follow as the command's last word, once the data are
+    safe."""
+    what = "stopped for safety" if isinstance(error, SafetyStop) else "failed"
+    return f"The {error.device} has {what}. {UNLOAD}"
+
+
 def station_clock(station: Station) -> Clock:
     """Real time with hardware; emulated stations may run faster."""
     return Clock(station.emulation.speed if station.emulation else 1.0)
@@ -84,11 +115,7 @@ def make_devices(station: Station, clock: Clock) -> Devices:
     from drivers.ur10e.client import Ur10e
 
     if station.robot is None or station.dynamometer is None or station.laser is None:
-        names = [n for n in ("robot", "dynamometer", "laser") if getattr(station, n) is None]
-        raise InputError(
-            f"{station.path}: the station has no {', '.join(names)}; "
-            "measuring needs robot, dynamometer and laser. Add the section to the file."
-        )
+        raise incomplete(station)
     emulated = station.emulation is not None
     return Devices(
         robot=Ur10e(station.robot, clock, emulated),

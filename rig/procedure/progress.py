@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from math import nan
 from typing import Any, Protocol
+
+from rig.procedure.unloaded import Unloaded
 
 
 class JournalRecord(Protocol):
@@ -27,7 +30,7 @@ class Progress:
     skipped step counts as done. A repetition counts as a whole: force and datum are zeroed anew for
     every one, and what an arm does on the way down depends on how far it has been up.
     first_rows: of the repetitions that were begun. resting: the rest after the last one had not
-    passed.
+    passed. unloaded: where the arm stood without load in the setup that was measured last.
     """
 
     repetitions: set[tuple[int, int]] = field(default_factory=set)
@@ -37,6 +40,7 @@ class Progress:
     session_s: float = 0.0
     first_rows: dict[tuple[int, int], int] = field(default_factory=dict)
     resting: bool = False
+    unloaded: Unloaded = field(default_factory=Unloaded)
 
     @property
     def done_steps(self) -> int:
@@ -67,6 +71,9 @@ def read_progress(records: Iterable[JournalRecord]) -> Progress:
         if record.kind == "sample":
             progress.rows += 1
             progress.segment = max(progress.segment, data["segment"])
+            values = data.get("values", {})
+            force_N, laser_mm = _value(values, "force_N"), _value(values, "laser_mm")
+            progress.unloaded.row(data.get("branch", ""), force_N, laser_mm)
         elif record.kind == "event":
             _apply(progress, data)
     return progress
@@ -87,3 +94,11 @@ def _apply(progress: Progress, event: dict[str, Any]) -> None:
         progress.forget_repetition(event["run"], event["repetition"])
     elif kind == "tared":
         progress.resting = False
+        setup = (event.get("pose", ""), event.get("direction", ""))
+        progress.unloaded.tared(setup, _value(event, "laser_mm"))
+
+
+def _value(values: dict[str, Any], name: str) -> float:
+    """nan where there is none, or an older version has not noted it."""
+    value = values.get(name)
+    return nan if value is None else float(value)

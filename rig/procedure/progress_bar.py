@@ -75,6 +75,10 @@ class LoaderWithBar:
         """The loader answers."""
         return self._loader.ask(prompt)
 
+    def withdraw(self) -> None:
+        """The loader does."""
+        self._loader.withdraw()
+
     def guide(self, view: LiveView) -> None:
         """Moves the bar on when the sampling of another step has ended."""
         self._loader.guide(view)

@@ -9,10 +9,11 @@ from typing import Any
 from drivers.interfaces import Loader, Prompt
 from rig.errors import MeasurementStopped
 from rig.procedure.limits import UNLOAD
-from rig.procedure.recorder import Place, Recorder, Slot, Vector
+from rig.procedure.recorder import Place, Recorder, Slot, Vector, along
 from rig.procedure.settle import SettleWindow
 from rig.procedure.supervision import Supervision, Wish
 from rig.procedure.touched import Touched
+from rig.procedure.unloaded import Unloaded
 from rig.protocol import MeasurementProtocol, Run, Step
 
 
@@ -42,11 +43,13 @@ class StepProcedure:
         supervision: Supervision,
         recorder: Recorder,
         loader: Loader,
+        unloaded: Unloaded,
     ) -> None:
         self._protocol = protocol
         self._supervision = supervision
         self._recorder = recorder
         self._loader = loader
+        self._unloaded = unloaded
         self._window = SettleWindow(protocol.settle)
         self._done: list[tuple[float, float]] = []  # (force N, displacement mm), unloaded first
         self.restart()
@@ -241,6 +244,8 @@ class StepProcedure:
             settled=settled,
         )
         self._recorder.sample(slot, place)
+        force_N, _ = along(slot.dynamometer, where.unit_vector)
+        self._unloaded.row(step.branch, force_N, slot.laser.values[0])
         return True
 
     def event(self, where: Where, kind: str, text: str, **data: Any) -> None:

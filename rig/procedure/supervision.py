@@ -14,17 +14,26 @@ from dataclasses import replace
 from math import nan
 from typing import TypedDict, Unpack
 
-from drivers.interfaces import Branch, Command, LimitLevel, LiveView, Loader, Phase, Prompt
+from drivers.interfaces import (
+    WITHDRAWN,
+    Branch,
+    Command,
+    LimitLevel,
+    LiveView,
+    Loader,
+    Phase,
+    Prompt,
+)
 from rig.errors import MeasurementStopped
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.limits import UNLOAD, Breach, Live, Watch
 from rig.procedure.recorder import Recorder, Slot, Vector
 
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
-OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
+# Without a step under way there is nothing that they could mean.
+OF_A_STEP = {"redo_step": "redone", "skip": "skipped"}
 ONLY_ABORT = "Meanwhile nothing is heard but an abort"
 TO_STOP = "Stop the measurement? --resume then measures a repetition under way anew, as a whole."
-HEARD = "Ctrl-C was heard; whether to stop is the next question. Ctrl-C again stops at once."
 
 
 class Changes(TypedDict, total=False):
@@ -170,13 +179,16 @@ class Supervision:
         """Asks without looking away: limits and devices are watched until the answer comes.
 
         watching False is for work on the unloaded rig, which looks like any fault: the arm is led
-        to its pose, cables are touched, the amplifier is in Reset. After a Ctrl-C meanwhile,
-        whether to stop is asked before anything else; a motion of the arm is called off unasked.
+        to its pose, cables are touched, the amplifier is in Reset. A Ctrl-C meanwhile takes the
+        question back until it is answered whether to stop: else one would have to confirm what one
+        does not want; a motion of the arm is called off unasked.
         """
-        answer = self._ask(prompt, watching)
-        if answer not in ("abort", "move"):
-            self._hear_interrupt(watching)
-        return answer
+        while True:
+            answer = self._ask(prompt, watching)
+            if answer not in ("abort", "move"):
+                self._hear_interrupt(watching)
+            if answer != WITHDRAWN:
+                return answer
 
     def _ask(self, prompt: Prompt, watching: bool) -> str:
         answer: Future[str] = Future()
@@ -193,16 +205,16 @@ class Supervision:
         thread.start()
         try:
             while thread.is_alive():
-                if self._interrupts > interrupts:  # else it would seem that nobody has heard it
-                    interrupts = self._interrupts
-                    self._loader.notify(HEARD, "warning")
+                if self._interrupts > interrupts:
+                    self._loader.withdraw()
                 if watching:
                     self.tick()
                 else:
                     thread.join(0.05)
         finally:
             self._prompts -= 1
-        self._recorder.event("prompt", prompt.text, key=prompt.key, answer=answer.result())
+        if answer.result() != WITHDRAWN:
+            self._recorder.event("prompt", prompt.text, key=prompt.key, answer=answer.result())
         return answer.result()
 
     def answers(self, answers: tuple[str, ...]) -> tuple[str, ...]:
@@ -234,9 +246,9 @@ class Supervision:
             self._loader.notify(f"{ONLY_ABORT}.", "warning")
         elif command == "pause":
             self._pause("Paused. The arm may be under load.")
-        elif command in OF_A_STEP and not self.view.step:
-            wish = command.replace("_", " ")
-            self._loader.notify(f"No step is under way: nothing to {wish}.", "warning")
+        elif command is not None and command in OF_A_STEP and not self.view.step:
+            done = OF_A_STEP[command]
+            self._loader.notify(f"No step is under way that could be {done}.", "warning")
         elif command is not None:
             self.obey(command)
 
@@ -274,9 +286,9 @@ class Supervision:
         for breach in breaches:
             if breach.action == "stop":
                 self._recorder.event("limit", breach.text, action="stop")
-                text = f"{breach.text}; the measurement is stopped. {UNLOAD}"
-                self._loader.notify(text, "error")
-                raise MeasurementStopped(text)
+                # The limit follows as the command's last word, once the data are safe.
+                self._loader.notify(f"Stopped at a limit of {breach.quantity}. {UNLOAD}", "error")
+                raise MeasurementStopped(f"{breach.text}; the measurement is stopped. {UNLOAD}")
 
     def _on_breach(self, breach: Breach) -> None:
         if breach.action == "pause" and not self._prompts and not self._paused:

@@ -84,7 +84,7 @@ def _protocol(asked: Node) -> Iterator[Block]:
         return
     words: Rich = (
         *asked["repetitions"].number(),
-        " repetitions, ",
+        " repetition, " if asked["repetitions"].value == 1 else " repetitions, ",
         _BRANCHES[asked["branches"].text()],
         "; ",
         _ORDERS[asked["order"].text()],

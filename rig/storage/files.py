@@ -76,6 +76,20 @@ def check_folder(path: Path, option: str = "") -> None:
         )
 
 
+def check_writable(path: Path) -> None:
+    """InputError where no new file can be made beside `path`. It is tried: permissions alone do not
+    tell (/proc, a medium that is full or write-protected, a name that is too long)."""
+    try:
+        descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        os.close(descriptor)
+        Path(name).unlink()
+    except OSError as error:
+        raise InputError(
+            f"{path}: nothing can be written into the folder {path.parent} "
+            f"({error.strerror or error}). Choose another with -o."
+        ) from error
+
+
 def neighbours(path: Path, *patterns: str) -> str:
     """For a file that is not there: the one that may have been meant, by what stands before the
     ending, or those that there are; nothing where there are none."""

@@ -130,7 +130,7 @@ def read_document_text(
             if not reader.is_bad(path):
                 reader.problems.append(_problem(reader.places, path, what))
     if reader.problems or value is None:
-        refuse(name, reader.problems)
+        refuse(name, reader.problems, more=value is None and check is not None)
     return Document(name, text, value, reader.places)
 
 

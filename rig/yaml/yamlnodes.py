@@ -62,12 +62,15 @@ class Problem:
     text: str
 
 
-def refuse(name: str, problems: Sequence[Problem]) -> NoReturn:
-    """Raises one InputError with a line per problem, in the order of the file."""
+def refuse(name: str, problems: Sequence[Problem], *, more: bool = False) -> NoReturn:
+    """Raises one InputError with a line per problem, in the order of the file. more: there is more
+    to check, which needs what is wrong."""
     ordered = sorted(problems)
     lines = [f"{address(name, p)}: {p.text}" for p in ordered[:MAX_SHOWN]]
     if len(ordered) > MAX_SHOWN:
         lines.append(f"{name}: and {len(ordered) - MAX_SHOWN} more problems.")
+    if more:
+        lines.append(f"{name}: whether its values fit each other is checked once that is mended.")
     raise InputError("\n".join(lines))
 
 

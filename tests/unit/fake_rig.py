@@ -172,6 +172,8 @@ class FakeLoader:
             return given.pop(0)
         return prompt.answers[0] if prompt.answers else "because"
 
+    def withdraw(self) -> None: ...
+
     def guide(self, view: LiveView) -> None:
         self.views.append(view)
         self.script(view)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -109,3 +110,39 @@ def test_the_way_down_to_zero_is_no_drift() -> None:
 
 def test_a_recording_without_load_has_no_range_to_compare_with() -> None:
     assert analyze(recorded(run(spring, (), zero_N=lambda t: t))).notes == ()
+
+
+def pressed(tared_at_N: float, law: Callable[[float], float] = spring) -> list[Row]:
+    """A run that was zeroed while the screw pressed so hard, and unloaded at its end."""
+    above = [f for f in LEVELS if f > tared_at_N]
+    rows = run(law, above)
+    end = len(rows) - 4
+    at_mm = law(tared_at_N)
+    loads = [(*row[:-2], row[-2] - tared_at_N, row[-1] - at_mm) for row in rows[4:end]]
+    return [*rows[:4], *loads, *((*row[:-2], -tared_at_N, -at_mm) for row in rows[end:])]
+
+
+def softening(force: float) -> float:
+    return force / 100.0 + (force / 100.0) ** 3
+
+
+@pytest.mark.parametrize("law", [spring, softening])
+def test_a_repetition_that_was_tared_under_load(law: Callable[[float], float]) -> None:
+    rows = pressed(30.0, law)
+    notes = analyze(recorded([*rows, *run(law, LEVELS, repetition=2)])).notes
+    assert notes == (
+        "Repetition 1 (P1 x) seems to have been tared while the screw still pressed: unloaded, "
+        f"force and displacement stood 30.0 N and {law(30.0):.3f} mm below their zeros, in the "
+        "ratio of the loading curve. A straight line over time is taken off the force, but this "
+        "was no drift: its levels and k are wrong. Measure it again, with the screw clear of the "
+        "arm when it is tared.",
+    )
+
+
+def test_an_amplifier_that_drifts_and_an_arm_that_gives_way_were_not_tared_under_load() -> None:
+    rows = run(spring, LEVELS)
+    end = len(rows) - 4
+    for at_mm in (0.0, 0.05, 0.4, -0.1):
+        moved = [(*row[:-2], -30.0, at_mm) for row in rows[end:]]
+        (note,) = analyze(recorded([*rows[:end], *moved])).notes
+        assert note.startswith("The force at zero load moved by 30.0 N")

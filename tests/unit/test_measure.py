@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import os
+import errno
+import re
 from contextlib import nullcontext
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -11,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from drivers.errors import ReadTimeout
+from drivers.errors import DeviceError, ReadTimeout, SafetyStop
 from drivers.interfaces import LiveView
 from rig import measure
 from rig.dataset import journal_path, load
@@ -26,9 +27,23 @@ from rig.protocol import load_protocol
 from rig.resuming import interrupted, resumed
 from rig.station import load_station
 from tests.unit.example_data import write_journal
-from tests.unit.runner_bench import Bench
+from tests.unit.runner_bench import Bench, at
 
 PROTOCOL = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
+
+
+def test_a_station_without_a_device_says_what_to_add(tmp_path: Path) -> None:
+    station = tmp_path / "half.yaml"
+    text = load_station("ur10e_lab").text
+    laser = text[text.index("\nlaser:") : text.index("\noperator:")]
+    robot = text[text.index("\nrobot:") : text.index("\ndynamometer:")]
+    station.write_text(text.replace(laser, "").replace(robot, ""))
+    with pytest.raises(InputError) as caught:
+        measure.measure(PROTOCOL, str(station), tmp_path / "x.h5", print)
+    assert str(caught.value) == (
+        f"{station}: the station has no robot and no laser; measuring needs robot, dynamometer and "
+        "laser. Add `robot:` and `laser:` as in protocols/stations/ur10e_lab.yaml."
+    )
 
 
 def test_what_must_be_read_is_said_before_the_screen_moves(
@@ -40,6 +55,7 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
         "emulated_rig": lambda station, _protocol, _before: nullcontext(station),
         "make_devices": lambda *_: None,
         "open_devices": lambda *_: None,
+        "refuse_emulators": lambda *_: None,
         "make_loader": lambda *_: loader,
         "LoaderWithBar": lambda inner, *_: inner,
     }
@@ -68,11 +84,64 @@ def test_a_data_set_is_named_as_one(tmp_path: Path) -> None:
 def test_a_folder_that_refuses_is_told_before_a_device_is_opened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("os.access", lambda _path, mode: mode != os.W_OK)
+    def refused(*_: object, **__: object) -> object:
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory")  # as /proc says
+
+    monkeypatch.setattr("tempfile.mkstemp", refused)
     monkeypatch.setattr(measure, "_opened", lambda *_: pytest.fail("devices were opened"))
-    words = rf"x\.h5: nothing may be written into the folder {tmp_path}\. Choose another with -o\."
+    words = (
+        rf"x\.h5: nothing can be written into the folder {tmp_path} "
+        r"\(No such file or directory\)\. Choose another with -o\."
+    )
     with pytest.raises(InputError, match=words):
         measure.measure(PROTOCOL, "emulated", tmp_path / "x.h5", print)
+
+
+def test_the_warnings_of_the_plan_are_told_before_a_device_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+
+    class Opening(Exception):
+        pass
+
+    def opened(*_: object) -> object:
+        raise Opening
+
+    monkeypatch.setattr(measure, "_opened", opened)
+    protocol = tmp_path / "tight.yaml"
+    tight = "displacement_mm: {max: 1.2, at: stop}"
+    protocol.write_text(re.sub(r"displacement_mm: \{max.*?\}", tight, PROTOCOL.read_text()))
+    with pytest.raises(Opening):
+        measure.measure(protocol, "emulated", tmp_path / "x.h5", said.append)
+    assert said[0] == (
+        "Warning: pose P1, direction x: about 1.6 mm expected at 220 N, limits.displacement_mm.max "
+        "is 1.2 mm: 30 % too much, unless the arm is stiffer. Lower the top force, or give "
+        "stop_at_displacement_mm."
+    )
+    assert not list(tmp_path.glob("*.h5*"))
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (SafetyStop("robot", "protective stop", "Keep clear."), "The robot has stopped for safety"),
+        (ReadTimeout("laser", "silent", "Check."), "The laser has failed"),
+    ],
+)
+def test_a_stop_for_safety_is_no_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: DeviceError, told: str
+) -> None:
+    bench = Bench(tmp_path)
+    at(bench, 2, lambda: bench.arm.broken.update({error.device: error}))
+    monkeypatch.setattr(measure, "_finish", lambda *_, **__: None)
+    station = load_station("emulated")
+    rig = measure._Rig(station, bench.devices, bench.loader, bench.clock, Onlooker())
+    with Journal.create(bench.path, {}) as journal:
+        job = measure.Job(tmp_path / "run.h5", bench.protocol, station, journal, Progress())
+        with pytest.raises(type(error)):
+            measure._carry_out(job, rig, print)
+    assert f"{told}. {UNLOAD}" in bench.loader.said
 
 
 @pytest.mark.parametrize(("speed", "synced"), [(50.0, False), (1.0, True), (0.5, True)])

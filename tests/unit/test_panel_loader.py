@@ -12,7 +12,7 @@ import pytest
 
 from drivers.clock import Clock
 from drivers.errors import DeviceError
-from drivers.interfaces import Command, Prompt
+from drivers.interfaces import WITHDRAWN, Command, Prompt
 from drivers.operator.console import ConsoleOperator
 from drivers.operator.settings import OperatorSettings
 from rig.errors import MeasurementStopped
@@ -200,6 +200,28 @@ def console(available: bool) -> ConsoleOperator:
     keys.available = available  # type: ignore[attr-defined]
     operator._keys = keys  # type: ignore[assignment]
     return operator
+
+
+def test_a_question_that_is_taken_back_leaves_console_and_page(page: Page) -> None:
+    operator = console(available=True)
+    loader = beside(page, operator, scripted=False)
+    loader.withdraw()  # without a question nothing happens
+    asking = Asking(loader, ASK)
+    page.question()
+    loader.withdraw()
+    assert asking.outcome() == WITHDRAWN
+    assert page.link.states[-1].prompt is None
+    assert operator._question is None
+
+
+def test_a_question_that_is_taken_back_is_not_carried_out(page: Page, hand: FakeLoader) -> None:
+    page.attended = True
+    loader = beside(page, hand)
+    asking = Asking(loader, MOUNT)
+    page.question()
+    loader.withdraw()
+    assert asking.outcome() == WITHDRAWN
+    assert hand.asked == []
 
 
 def test_a_question_stands_at_console_and_page(page: Page) -> None:

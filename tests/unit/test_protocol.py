@@ -184,6 +184,19 @@ def test_three_mistakes_are_one_message_with_their_places() -> None:
     ]
 
 
+def test_what_could_not_be_checked_is_said() -> None:
+    # the second run has no steps: whether it has is a matter of several keys
+    levels = "[7.5, 15, 22.5, 30, 37.5, 45, 52.5, 60, 67.5, 75, 78, 82]"
+    text = changed(("repetitions: 3\n", ""), ("rest_s: ", "rest_s: ten # "), (levels, ""))
+    with pytest.raises(InputError) as caught:
+        parse_protocol(text, PATH)
+    first, second, last = str(caught.value).splitlines()
+    assert "repetitions: is missing" in first
+    assert 'rest_s: the text "ten" is not allowed' in second
+    assert last == "P: whether its values fit each other is checked once that is mended."
+    assert "is checked once" not in "".join(said((levels, "")))
+
+
 @pytest.mark.parametrize(
     ("hold_s", "rate_Hz", "samples"), [(0, 1, 5), (5.2, 1, 6), (6.5, 1, 7), (12.5, 4.4, 55)]
 )

@@ -11,6 +11,8 @@ import pytest
 from rig import cli
 from rig.dataset import load
 from rig.report.document import Block, Bullets, Cell, Facts, Paragraph, Section, Table, Word, rich
+from rig.report.measured_section import _protocol
+from rig.report.results import Node
 from rig.report.wishes import Wishes
 from tests.unit.report_sets import bench, rewritten, sketch
 
@@ -50,6 +52,25 @@ def words(cell: Cell) -> str:
 def giving_way(force: float, r: int) -> float:
     below = min(force, 62.0) / 80 * (1 + 0.004 * (r - 2))
     return below + max(0.0, force - 62.0) / (4 + 0.1 * r)
+
+
+@pytest.mark.parametrize(
+    ("count", "said"), [(1, "1 repetition, loading"), (3, "3 repetitions, loading")]
+)
+def test_repetitions_are_counted_in_english(count: int, said: str) -> None:
+    asked = {
+        "repetitions": count,
+        "branches": "loading",
+        "order": "by_run",
+        "rate_Hz": 1.0,
+        "samples_per_step": 5,
+        "hold_s": 0.0,
+        "rest_s": 10.0,
+        "zero_before_s": 6.0,
+        "zero_after_s": 6.0,
+        "runs": [],
+    }
+    assert f"Procedure: {said}; " in "\n".join(lines(tuple(_protocol(Node(asked)))))
 
 
 def test_the_text_word_for_word(tmp_path: Path) -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pytest
 
 from drivers.errors import ReadTimeout, SafetyStop
-from drivers.interfaces import Command, LiveView, Prompt
+from drivers.interfaces import WITHDRAWN, Command, LiveView, Prompt
 from rig.errors import MeasurementStopped
-from rig.procedure.supervision import HEARD
 from rig.protocol import parse_protocol
 from tests.unit.runner_bench import ALL, MOVING, PROTOCOL, Bench, at
 
@@ -39,7 +39,9 @@ def test_the_force_limit_stops_keeps_and_tells(bench: Bench) -> None:
     message = "force 150 N is above the limit of 100 N; the measurement is stopped. Turn the screw"
     with pytest.raises(MeasurementStopped, match=message):
         bench.run()
-    assert bench.loader.said[-1].startswith("force 150 N is above the limit of 100 N")
+    assert bench.loader.said[-1] == (
+        "Stopped at a limit of force. Turn the screw back until it no longer touches the arm."
+    )
     assert len(bench.records("sample")) > 5
 
 
@@ -74,32 +76,34 @@ def test_the_first_ctrl_c_asks_and_the_second_stops(bench: Bench) -> None:
         bench.runner.interrupt()
 
 
-def test_a_ctrl_c_under_a_question_is_answered(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("key", ["mount", "unload"])
+@pytest.mark.parametrize("answer", ["continue", "abort"])
+def test_a_ctrl_c_under_a_question_comes_before_its_answer(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, key: str, answer: str
 ) -> None:
-    ask, heard = bench.loader.ask, threading.Event()
-    notify = bench.loader.notify
+    ask, withdrawn = bench.loader.ask, threading.Event()
 
-    def answered_late(prompt: Prompt) -> str:
-        if prompt.key == "mount" and not heard.is_set():
+    def not_answered(prompt: Prompt) -> str:
+        if prompt.key == key and not withdrawn.is_set():
             assert bench.runner is not None
             bench.runner.interrupt()
-            assert heard.wait(10.0)
+            assert withdrawn.wait(10.0)
+            bench.loader.asked.append(prompt)
+            return WITHDRAWN
         return ask(prompt)
 
-    def told(text: str, level: Literal["info", "warning", "error"] = "info") -> None:
-        notify(text, level)
-        heard.set()
-
-    monkeypatch.setattr(bench.loader, "ask", answered_late)
-    monkeypatch.setattr(bench.loader, "notify", told)
-    bench.loader.answers["interrupt"] = ["continue"]
-    bench.run()
-    assert bench.loader.said.count(HEARD) == 1
+    monkeypatch.setattr(bench.loader, "ask", not_answered)
+    monkeypatch.setattr(bench.loader, "withdraw", withdrawn.set)
+    bench.loader.answers["interrupt"] = [answer]
+    with pytest.raises(MeasurementStopped) if answer == "abort" else nullcontext():
+        bench.run()
     asked = [p.key for p in bench.loader.asked]
-    assert asked[asked.index("mount") + 1] == "interrupt", "straight after the open question"
+    first = asked.index(key)
+    assert asked[first + 1] == "interrupt"
     assert asked.count("interrupt") == 1
-    assert bench.steps() == ALL
+    assert asked[first + 2 : first + 3] == ([key] if answer == "continue" else []), "asked anew"
+    assert bench.steps() == (ALL if answer == "continue" else [])
+    assert WITHDRAWN not in [e["answer"] for e in bench.events("prompt")]
 
 
 def test_who_aborts_after_a_ctrl_c_is_not_asked_again(

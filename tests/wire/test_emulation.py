@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -25,6 +27,7 @@ from drivers.ur10e.client import Ur10e
 from rig.emulation import emulated
 from rig.emulation.emulated import EmulatedRig, serve_by_hand
 from rig.errors import InputError
+from rig.procedure.devices import Devices, make_devices, refuse_emulators, station_clock
 from rig.station import Emulation, FaultPlan, Station, load_station
 from rig.worlds import make_world
 from rig.worlds.linear import REFERENCE_Q_RAD
@@ -75,6 +78,30 @@ def test_every_address_is_filled_in(rig: EmulatedRig) -> None:
         assert str(running.operator.screw).startswith("127.0.0.1:")
         assert replace(running.robot, host="emulated") == given.robot
         assert running.emulation == given.emulation
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("robot", 'serial number "0000000000-EMULATED"'),
+        ("dynamometer", 'daq product type "emulated NI DAQ"'),
+        ("laser", 'info "ILD2200 emulator '),
+    ],
+)
+def test_an_emulator_at_the_address_of_a_real_device_is_refused(
+    rig: EmulatedRig, name: str, said: str
+) -> None:
+    quiet = SimpleNamespace(identity=dict)
+    with rig as running, ExitStack() as stack:
+        devices = make_devices(replace(running, emulation=None), station_clock(running))
+        device = getattr(devices, name)
+        stack.callback(device.close)
+        device.open()
+        found = Devices(**{**dict.fromkeys(("robot", "dynamometer", "laser"), quiet), name: device})
+        refuse_emulators(running, found)
+        words = f"{running.path}: the {name} calls itself emulated ({said}"
+        with pytest.raises(InputError, match=re.escape(words)):
+            refuse_emulators(replace(running, emulation=None), found)
 
 
 def test_a_person_at_the_console_gets_no_screw() -> None:
@@ -217,8 +244,15 @@ def test_unknown_faults_name_the_known(rig: EmulatedRig) -> None:
 
 def test_an_unknown_scheduled_fault_is_refused_at_the_start() -> None:
     fault = FaultPlan(device="robot", kind="melted", after_s=3.0)
+    given = station(faults=(fault,))
     with pytest.raises(InputError, match=r'emulation\.faults\[0\]: the robot has no fault "melt'):
-        EmulatedRig(station(faults=(fault,))).start()
+        EmulatedRig(given).start()
+    written = "faults: [{device: robot, kind: melted, after_s: 3}]"
+    text = given.text.replace("faults: []", written)
+    line = 1 + text[: text.index("kind: melted")].count("\n")
+    place = re.escape(f"{given.path}:{line}:") + r"\d+: emulation\.faults\[0\]: "
+    with pytest.raises(InputError, match=place):
+        EmulatedRig(replace(given, text=text)).start()
 
 
 def test_an_unknown_world_is_refused_at_the_start() -> None:
