@@ -42,7 +42,7 @@ def flowing_play(
     steps = _steps(rows, begins)
     squared = np.broadcast_to(np.asarray(square, dtype=bool), k)
     states, state = np.empty((len(steps.row), k)), hung[0]
-    for a, b in pairwise(_edges(steps, max(_AT_ONCE // k, 1))):
+    for a, b in pairwise(_edges(steps, max(_AT_ONCE // max(k, 1), 1))):
         row = steps.row[a:b]
         x = steps.old[a:b, None] * before[row] + steps.new[a:b, None] * load[row]
         over = steps.seconds[a:b, None] / times
