@@ -16,6 +16,7 @@ from identification.gap.explanations.explanation import Explanation, SearchResul
 from identification.gap.explanations.fit import fit
 from identification.gap.explanations.penalties import below_noise, cancelling, minor_parts
 from identification.gap.explanations.verdict import with_posterior
+from identification.gap.judging import cross_validation, residuals
 from identification.gap.judging.choice import chosen_of
 from identification.gap.judging.cross_validation import _foretold, reweighted_by_validation
 from identification.gap.judging.heldout import (
@@ -115,6 +116,25 @@ def test_what_repeats_is_foreseen_and_what_is_fitted_run_by_run_is_not() -> None
     each = held_out(e, explained([1, 2, 3], "zero_shift", 0.0), "repetition", fold)
     assert alike.after < 1e-6
     assert each.after > 5e-6
+
+
+@pytest.mark.parametrize(
+    ("left", "after", "foreseen"),
+    [(1.0, 2.5, False), (1.5, 2.5, True), (1.5, 3.5, False), (3.0, 3.5, False)],
+)
+def test_what_a_fit_to_all_repetitions_leaves_too_is_not_unforeseen(
+    monkeypatch: pytest.MonkeyPatch, left: float, after: float, foreseen: bool
+) -> None:
+    """Times the noise; of a fit that leaves more, laws are to blame."""
+    e = engine(np.zeros(3))
+    noise, law = residuals.noise_rms(e.bench), explained([0], "joint_nonlinear_stiffness", 0.0)
+    e.structural = 1e-9
+    judged = cross_validation.__name__
+    monkeypatch.setattr(f"{judged}.residual_rms", lambda *_: left * noise)
+    held = replace(held_out(e, law, "repetition", folds(e)["repetition"]), after=after * noise)
+    monkeypatch.setattr(f"{judged}.held_out", lambda *_: held)
+    kept = reweighted_by_validation(found(e, law)).kept
+    assert (kept[law.words] > cross_validation.PASSES_ABOVE) is foreseen
 
 
 def test_a_fit_of_the_session_loses_its_weight_to_what_foresees() -> None:

@@ -32,6 +32,9 @@ from identification.gap.words import (
 )
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
+# Of the noise: what a fit to all repetitions leaves, too, is no failure to foresee one of them. The
+# noise within holds may be less than that between them, or stated too small.
+LEAVES = 1.6
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
 _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
 
@@ -134,7 +137,9 @@ def _kept(found: SearchResult, explanation: Explanation, fold: Ints) -> float:
     after = held_out(engine, explanation, "repetition", fold, loose).after
     seen = CLOSED * _moved(engine, fitted)
     unseen = engine.bench.rows.rms(unread_ramp_error(engine, fitted))
-    limit = max(FAILS * noise_rms(engine.bench), float(np.hypot(seen, unseen)))
+    noise = noise_rms(engine.bench)
+    known = float(np.clip(residual_rms(engine, fitted), noise, LEAVES * noise))
+    limit = max(FAILS * known, float(np.hypot(seen, unseen)))
     return soft_limit(after, limit)
 
 
