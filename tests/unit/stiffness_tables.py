@@ -43,6 +43,7 @@ class Table:
     complete: bool = True
     lines: tuple[str, ...] = ()
     events: list[dict[str, Any]] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
 
     @property
     def used(self) -> Any:
