@@ -50,7 +50,11 @@ def _related(force: Array, displacement: Array) -> bool:
 def judge(table: LevelTable, residuals: Array, k: float) -> tuple[Status, str]:
     """Whether one line describes the levels; k N/m. A doubt comes with its sentence."""
     if k < 0:
-        return "doubtful", "The displacement falls while the force rises: k is negative."
+        return "doubtful", (
+            "The displacement falls while the force rises: k is negative. Unless what was loaded "
+            "gave way there, one of the two has the wrong sign: turn the one that does not count "
+            "along the direction."
+        )
     if table.size > 2 and np.ptp(table.displacement) > 0:
         spread = float(np.sum((table.displacement - table.displacement.mean()) ** 2))
         explained = 1.0 - float(np.sum(residuals**2)) / spread

@@ -17,6 +17,7 @@ from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
 from rig.oddities import oddities
+from rig.scale import off_scale, wrong_sign
 from rig.software import software_version
 from rig.storage import csvcells
 from rig.storage.columns import (
@@ -62,7 +63,8 @@ def import_table(
     columns = table.read(progress or silent)
     found = contradictions(document.value, columns)
     document.refuse([document.problem(path, what) for path, what in found])
-    table.notes += oddities(document.value, columns)
+    for notes_of in (oddities, wrong_sign, off_scale):
+        table.notes += notes_of(document.value, columns)
     dataset = _dataset(csv, table, columns, document.value, document.text)
     if out is not None:
         (progress or silent)("writing", 0.0)

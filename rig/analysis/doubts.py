@@ -10,13 +10,15 @@ from collections.abc import Iterator
 
 from rig.analysis.quality import STILL, Recorded, slots_missed, unsettled_levels, zeros_of
 from rig.digits import number
+from rig.scale import off_scale
 
 _MOST_MISSED = 0.1  # of the sampling slots
 
 
 def doubts(dataset: Recorded) -> tuple[str, ...]:
     """One sentence each; none for a recording that went as it should."""
-    return (*_missed(dataset), *_unsettled(dataset), *_zero_moved(dataset))
+    units = (f"{said}." for said in off_scale(dataset.meta, dataset.columns))
+    return (*units, *_missed(dataset), *_unsettled(dataset), *_zero_moved(dataset))
 
 
 def _missed(dataset: Recorded) -> Iterator[str]:

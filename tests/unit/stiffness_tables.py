@@ -28,6 +28,9 @@ def meta(directions: Sequence[str] = ("x", "y"), datum: str = "setup") -> Any:
         directions=dict.fromkeys(directions, (1.0, 0.0, 0.0)),
         instruments=SimpleNamespace(force=force, displacement=laser),
         datum=datum,
+        robot="none",
+        poses={},
+        simulation=None,
     )
 
 
