@@ -15,6 +15,7 @@ from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.running import stretches
+from rig.analysis.doubts import doubts_of_effects
 from rig.contradictions import refuse_contradictions, without_turns
 from rig.dataset import Dataset
 from rig.digits import counted
@@ -89,7 +90,13 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
         onward=onward,
         aside=aside,
-        notes=(*notes, *without, *_unsettled(dataset), *_untold(onward)),
+        notes=(
+            *notes,
+            *without,
+            *_unsettled(dataset),
+            *doubts_of_effects(dataset),
+            *_untold(onward),
+        ),
     )
 
 
