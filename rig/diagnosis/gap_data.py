@@ -60,6 +60,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     )
     onward = unseen_ends(dataset.columns, dataset.events, used)[used]
     time, notes = _clock(np.nan_to_num(columns["time_s"].astype(float)), session, run)
+    said = (*doubts_of_effects(dataset), *_untold(onward))
     return GapData(
         arm=arm is not None,
         setups=setups,
@@ -90,13 +91,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
         onward=onward,
         aside=aside,
-        notes=(
-            *notes,
-            *without,
-            *_unsettled(dataset),
-            *doubts_of_effects(dataset),
-            *_untold(onward),
-        ),
+        notes=(*notes, *without, *_unsettled(dataset), *said),
     )
 
 
