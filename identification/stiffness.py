@@ -44,7 +44,7 @@ from identification.levels import (
     hysteresis,
     pointwise,
 )
-from identification.straight import Status, bend, judge, leaves_line, undefined
+from identification.straight import Status, bend, judge, leaves_line, levels_move, undefined
 from identification.uncertainty import Contribution, Quantity, combined
 
 
@@ -235,11 +235,12 @@ def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> St
     before = [p for p in described.pointwise if abs(p.force) <= highest]
     bends = bend(before, [a.value for a in rivals if not a.after_knee])
     alone = () if described.knee is not None else _last_alone(curve, used, choice)
+    moves = levels_move(k, curve.gain_sd_force, gain_effect(table, choice, curve.gain_sd_force))
     return replace(
         described,
         status=status,
         sentence=sentence,
-        notes=(*described.notes, *bends, *alone),
+        notes=(*described.notes, *bends, *moves, *alone),
         k=combined(k, budget),
         intercept=fit.intercept,
         budget=budget,

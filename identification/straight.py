@@ -15,6 +15,7 @@ Status = Literal["ok", "doubtful", "undefined"]
 BENT = 0.2  # change of the stiffness along a curve that is worth a word
 STRAIGHT = 0.8  # share of the displacement's variance below which a line is a poor description
 BY_CHANCE = 1e-3  # of calling a straight curve bent
+_SAME_SHARE = 0.1  # of the stated gain: less is not worth a word
 SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
 
 
@@ -50,7 +51,11 @@ def _related(force: Array, displacement: Array) -> bool:
 def judge(table: LevelTable, residuals: Array, k: float) -> tuple[Status, str]:
     """Whether one line describes the levels; k N/m. A doubt comes with its sentence."""
     if k < 0:
-        return "doubtful", "The displacement falls while the force rises: k is negative."
+        return "doubtful", (
+            "The displacement falls while the force rises: k is negative. Unless what was loaded "
+            "gave way there, one of the two has the wrong sign: turn the one that does not count "
+            "along the direction."
+        )
     if table.size > 2 and np.ptp(table.displacement) > 0:
         spread = float(np.sum((table.displacement - table.displacement.mean()) ** 2))
         explained = 1.0 - float(np.sum(residuals**2)) / spread
@@ -87,6 +92,18 @@ def bend(pointwise: Sequence[PointwiseStiffness], rivals: Sequence[float]) -> tu
     if rivals:
         note += f"; other choices give {min(rivals) / 1e3:.4g} to {max(rivals) / 1e3:.4g} N/mm"
     return (f"{note}.",)
+
+
+def levels_move(k: float, gain_sd: float, u: float) -> tuple[str, ...]:
+    """A note where the gain of the force, known to gain_sd, is worth another share of k (N/m) in
+    its uncertainty u (N/m): whoever works the budget out by hand would miss it."""
+    share = u / abs(k)
+    if abs(share - gain_sd) <= _SAME_SHARE * gain_sd:
+        return ()
+    return (
+        f"The gain of the force is stated to {100 * gain_sd:.3g} %, and is worth {100 * share:.3g} "
+        "% of k: it moves the levels, too, over which a curve that is not straight is averaged.",
+    )
 
 
 def leaves_line(grid: Grid, *, origin: bool) -> bool:

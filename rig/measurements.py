@@ -28,13 +28,32 @@ class _Instruments(Protocol):
     def displacement(self) -> _DisplacementInstrument: ...
 
 
-class _Meta(Protocol):
+class Stated(Protocol):
+    """META, as far as it counts here; `rig.meta.Meta` has it."""
+
     @property
-    def directions(self) -> Any: ...
+    def robot(self) -> str:
+        """Its name; none for a rig without an arm."""
+
     @property
-    def instruments(self) -> _Instruments: ...
+    def poses(self) -> Any:
+        """Name -> `rig.meta.MetaPose`."""
+
     @property
-    def datum(self) -> str: ...
+    def simulation(self) -> Any:
+        """`rig.meta.Simulation`, or None."""
+
+    @property
+    def directions(self) -> Any:
+        """Name -> unit vector."""
+
+    @property
+    def instruments(self) -> _Instruments:
+        """Of force and displacement."""
+
+    @property
+    def datum(self) -> str:
+        """Once a setup or before each repetition."""
 
 
 class Measurements(Protocol):
@@ -49,5 +68,5 @@ class Measurements(Protocol):
         """What happened, each with `kind` and the number of samples before it."""
 
     @property
-    def meta(self) -> _Meta:
-        """Directions, instruments, datum."""
+    def meta(self) -> Stated:
+        """Directions, instruments, datum, simulation."""

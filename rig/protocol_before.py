@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
+from typing import Any, Protocol
 
-from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.protocol import MeasurementProtocol, parse_protocol
 from rig.protocolfile import Limit, Limits
@@ -15,7 +15,19 @@ from rig.protocolfile import Limit, Limits
 _STRICTEST = ("stop", "pause", "warn")
 
 
-def protocol_before(dataset: Dataset) -> MeasurementProtocol | None:
+class Recorded(Protocol):
+    """What is asked of a data set; `rig.dataset.Dataset` has it."""
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """`protocol` and others, as they were given."""
+
+    @property
+    def path(self) -> Any:
+        """Where it lies, or None."""
+
+
+def protocol_before(dataset: Recorded) -> MeasurementProtocol | None:
     """The protocol that a data set was measured by; None for an imported table."""
     text = dataset.texts.get("protocol", "")
     if not text:
@@ -26,7 +38,7 @@ def protocol_before(dataset: Dataset) -> MeasurementProtocol | None:
         return None
 
 
-def limits_before(datasets: Iterable[Dataset]) -> Limits:
+def limits_before(datasets: Iterable[Recorded]) -> Limits:
     """Of everything that was watched in any of the data sets the least that was allowed, and the
     strictest that then happened."""
     known = [p.limits for d in datasets if (p := protocol_before(d)) is not None]

@@ -75,10 +75,20 @@ class RunEntry:
     )
     stop_at_displacement_mm: Annotated[float, Gt(0)] | None = None
 
-    def steps_key(self) -> str | None:
-        """The one key that gives the steps; None unless it is exactly one."""
-        keys = [k for k in ("steps_N", "steps", "steps_percent") if getattr(self, k) is not None]
-        return keys[0] if len(keys) == 1 else None
+    def __post_init__(self) -> None:
+        """Said with the mistakes of single values; what is wrong between keys is looked at once
+        there are none."""
+        if len(self._steps_keys()) != 1:
+            raise ValueError("give the steps as steps_N, steps or steps_percent, and one of them.")
+
+    def _steps_keys(self) -> list[str]:
+        keys = ("steps_N", "steps", "steps_percent")
+        return [key for key in keys if getattr(self, key) is not None]
+
+    def steps_key(self) -> str:
+        """The one key that gives the steps."""
+        (key,) = self._steps_keys()
+        return key
 
     def forces_N(self, rated_load_N: float | None) -> tuple[float, ...]:
         """Levels in the order of loading; empty where they cannot be told."""
@@ -296,9 +306,7 @@ def _run(written: ProtocolFile, run: RunEntry) -> Found:
         yield ("direction",), f'"{run.direction}" is unknown.{hint}'
     yield from _stop_displacement(written, run)
     key = run.steps_key()
-    if key is None:
-        yield (), "give the steps as steps_N, steps or steps_percent, and one of them."
-    elif key == "steps_percent" and written.rated_load_N is None:
+    if key == "steps_percent" and written.rated_load_N is None:
         yield (key,), "percent of what? rated_load_N is not given; write it."
     elif run.steps is not None:
         problem = _ramp(run.steps)

@@ -51,6 +51,7 @@ from rig.runs import (
     left_out,
     of_setup,
     of_stitched,
+    said_of_skipped,
     said_of_stitched,
     setups,
     stitched,
@@ -111,6 +112,7 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
             points, note = _bins(runs, zeros, stated)
             notes.append(note)
         notes += _notes(runs, zeros, dataset.meta.datum)
+        notes += said_of_skipped(dataset.events, pose, direction)
         result[pose, direction] = Curve(
             pose,
             direction,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -100,6 +100,27 @@ def ends_of_loading(
             at, number = int(event["sample"]), int(event["step"])
             there = at < len(step) and branch[at] == "loading" and step[at] == number
             yield at, number, bool(there)
+
+
+def said_of_skipped(events: Sequence[Mapping[str, Any]], pose: str, direction: str) -> list[str]:
+    """A sentence on every level of a pose and direction that the operator skipped, with the reason;
+    without those of repetitions that were measured anew as a whole."""
+    said = []
+    for at, event in enumerate(events):
+        how, _, why = str(event.get("outcome", "")).partition(": ")
+        where = event.get("pose"), event.get("direction")
+        if event["kind"] != "step_done" or how != "skipped" or where != (pose, direction):
+            continue
+        row = int(event["sample"]) - 1
+        if any(e["kind"] == "discard" and e["first"] <= row <= e["last"] for e in events[at:]):
+            continue
+        what = str(event["text"]).partition(":")[0]
+        reason = f": {why.strip().rstrip('.')}" if why.strip() else ", no reason given"
+        said.append(
+            f"Skipped by the operator: {what} (step {event['step']}, repetition "
+            f"{event['repetition']}){reason}."
+        )
+    return said
 
 
 def unseen_ends(

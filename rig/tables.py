@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
 from rig.oddities import oddities
+from rig.scale import off_scale, wrong_sign
 from rig.software import software_version
 from rig.storage import csvcells
 from rig.storage.columns import (
@@ -62,7 +63,8 @@ def import_table(
     columns = table.read(progress or silent)
     found = contradictions(document.value, columns)
     document.refuse([document.problem(path, what) for path, what in found])
-    table.notes += oddities(document.value, columns)
+    for notes_of in (oddities, wrong_sign, off_scale):
+        table.notes += notes_of(document.value, columns)
     dataset = _dataset(csv, table, columns, document.value, document.text)
     if out is not None:
         (progress or silent)("writing", 0.0)
@@ -166,8 +168,7 @@ class _Table:
     def _check_names(self, file: CsvFile) -> None:
         for column in KNOWN.values():
             if column.required and column.name not in file.names:
-                hint = close_match(column.name.lower(), [n.lower() for n in file.names])
-                near = next((n for n in file.names if n.lower() == hint), "") if hint else ""
+                near = close_match(column.name, file.names)
                 more = len(file.names) - _LISTED
                 names = [*file.names[:_LISTED], *([f"and {more} more"] if more > 0 else [])]
                 raise InputError(
@@ -268,8 +269,8 @@ class _Table:
         rows = len(given["force_N"])
         defaults: dict[str, Callable[[], Values]] = {
             "time_s": lambda: np.arange(rows, dtype=np.float64),
-            "pose": lambda: self._only("pose", list(self._meta.poses), rows),
-            "direction": lambda: self._only("direction", list(self._meta.directions), rows),
+            "pose": lambda: self._only("pose", self._meta.poses, rows, given),
+            "direction": lambda: self._only("direction", self._meta.directions, rows, given),
             "repetition": lambda: np.ones(rows, np.int64),
             "branch": lambda: np.full(rows, "cycle"),
             "step": lambda: np.full(rows, NO_STEP, np.int64),
@@ -305,13 +306,18 @@ class _Table:
         )
         return kept
 
-    def _only(self, what: str, names: list[str], rows: int) -> Values:
+    def _only(self, what: str, defined: Iterable[str], rows: int, further: Iterable[str]) -> Values:
+        """The one that META defines, for a column that is missing. further: names of columns among
+        which it may stand, misspelt."""
+        names = list(defined)
         if what == "pose" and self._meta.robot == "none":
             return empty("word", rows)
         if len(names) > 1:
+            near = close_match(what, list(further))
+            add = f'Rename the column "{near}"' if near else "Add the column"
             raise InputError(
                 f"{self._path}: the column {what} is missing, and {self._meta_name} defines "
-                f"{len(names)}: {', '.join(names)}. Add the column, or leave one in META."
+                f"{len(names)}: {', '.join(names)}. {add}, or leave one in META."
             )
         return np.full(rows, names[0])
 

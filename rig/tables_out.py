@@ -80,8 +80,8 @@ def _write_parquet(dataset: Dataset, out: Path) -> None:
         import pyarrow.parquet as pq
     except ImportError:
         raise InputError(
-            f'{out}: Parquet needs the library pyarrow: pip install "stiffness-rig[parquet]". '
-            "CSV needs nothing."
+            f"{out}: Parquet needs the library pyarrow, which is not installed. Install it with "
+            "`pip install pyarrow`, or write CSV, which needs nothing."
         ) from None
     table = pa.Table.from_pandas(_frame(dataset), preserve_index=False)
     facts = {

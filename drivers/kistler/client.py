@@ -174,7 +174,7 @@ class Kistler9257B:
             raise CannotConnect(
                 DEVICE,
                 f"the Python package nidaqmx cannot be loaded ({error})",
-                "Install the program again: pip install stiffness-rig.",
+                "Install it anew with `pip install --force-reinstall nidaqmx`.",
             ) from error
         self._daq = daq = Daq(self.settings, self._block_s, self._clock.speed)
         try:

@@ -12,9 +12,11 @@ from identification import stiffness as st
 from identification.estimate import WEIGHTINGS, Weighting
 from identification.uncertainty import Contribution, Quantity
 from rig import schemas
+from rig.analysis.coverage import Coverage, coverage
 from rig.analysis.doubts import doubts
 from rig.analysis.quality import Recorded
 from rig.errors import InputError, close_to
+from rig.protocol_before import protocol_before
 from rig.reduce import curves
 from rig.storage.files import legible
 from rig.units import MM_PER_M, N_PER_MM
@@ -72,6 +74,10 @@ class Source(Recorded, Protocol):
         """Where it lies, or None."""
 
     @property
+    def texts(self) -> dict[str, str]:
+        """`protocol` and others, as they were given."""
+
+    @property
     def origin(self) -> str:
         """measured, emulated or imported."""
 
@@ -85,11 +91,12 @@ class Source(Recorded, Protocol):
 
 @dataclass(frozen=True)
 class Direction:
-    """One pose and direction; pose "" without an arm."""
+    """One pose and direction; pose "" without an arm. levels: what k rests on, None without k."""
 
     pose: str
     direction: str
     result: st.Stiffness
+    levels: Coverage | None = None
 
 
 @dataclass(frozen=True)
@@ -129,10 +136,11 @@ class Analysis:
 def analyze(dataset: Source, options: Options | None = None) -> Analysis:
     """Everything at once. Data that define no stiffness give a status, not an error."""
     estimator = (options or Options()).estimator()
-    found = {
-        setup: Direction(*setup, st.analyze_curve(curve, estimator))
-        for setup, curve in curves(dataset).items()
+    results = {
+        setup: st.analyze_curve(curve, estimator) for setup, curve in curves(dataset).items()
     }
+    levels = coverage(dataset, protocol_before(dataset), results)
+    found = {s: Direction(*s, result, levels.get(s)) for s, result in results.items()}
     keys = _keys(list(found))
     directions = {keys[setup]: d for setup, d in found.items()}
     anisotropy = {}
@@ -150,8 +158,14 @@ def analyze(dataset: Source, options: Options | None = None) -> Analysis:
         dataset.banners(),
         directions,
         anisotropy,
-        doubts(dataset),
+        (*_partial(directions), *doubts(dataset)),
     )
+
+
+def _partial(directions: dict[str, Direction]) -> tuple[str, ...]:
+    """A sentence on every k that is not that of a whole curve."""
+    told = (d.levels.doubt(key) for key, d in directions.items() if d.levels is not None)
+    return tuple(filter(None, told))
 
 
 def _keys(setups: Sequence[tuple[str, str]]) -> dict[tuple[str, str], str]:
@@ -187,6 +201,7 @@ def _direction(d: Direction) -> dict[str, Any]:
         "status": r.status,
         "status_text": r.sentence,
         "stiffness_N_per_mm": quantity(r.k, N_PER_MM),
+        "levels": None if d.levels is None else d.levels.to_json(),
         "weighting": r.choice.label,
         "weighting_reason": r.choice_reason,
         "intercept_mm": _number(r.intercept * MM_PER_M),

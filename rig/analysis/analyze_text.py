@@ -35,11 +35,17 @@ def answer(analysis: Analysis) -> str:
         if k is None:
             parts.append(f"k in {key} is undefined")
         else:
-            parts.append(f"k in {key} is {_with_interval(k, N_PER_MM)} N/mm")
+            parts.append(f"k in {key}{_over(direction)} is {_with_interval(k, N_PER_MM)} N/mm")
     for (a, b), ratio in analysis.anisotropy.items():
         parts.append(f"{a} is {_with_interval(ratio)} times as stiff as {b}")
     known = any(d.result.k is not None for d in analysis.directions.values())
     return "; ".join(parts) + (" (in brackets: 95 % intervals)." if known else ".")
+
+
+def _over(direction: Direction) -> str:
+    """The levels, where they are a part of those asked for: k and its interval are theirs alone."""
+    levels = direction.levels
+    return "" if levels is None or not levels.partial else f" (over {levels.words})"
 
 
 def _with_interval(q: Quantity, scale: float = 1.0) -> str:
@@ -59,7 +65,7 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
     if r.sentence:
         yield r.sentence
     if r.k is not None:
-        yield from _stiffness(r, r.k)
+        yield from _stiffness(r, r.k, _over(direction))
     if r.knee is not None:
         before, after = (number(k * N_PER_MM) for k in (r.knee.k_before, r.knee.k_after))
         yield (
@@ -80,12 +86,12 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
     yield from _tables(r)
 
 
-def _stiffness(r: Stiffness, k: Quantity) -> Iterator[str]:
+def _stiffness(r: Stiffness, k: Quantity, over: str) -> Iterator[str]:
     value = k.value * N_PER_MM
     low, high = (number(edge * N_PER_MM, beside=value) for edge in k.interval)
     yield (
-        f"k = {number(value)} N/mm, standard uncertainty {number(k.u * N_PER_MM, 2, value)} N/mm, "
-        f"95 % from {low} to {high} N/mm"
+        f"k{over} = {number(value)} N/mm, standard uncertainty "
+        f"{number(k.u * N_PER_MM, 2, value)} N/mm, 95 % from {low} to {high} N/mm"
     )
     yield f"Line: {r.choice.label}; {r.choice_reason}."
     if r.choice.intercept:

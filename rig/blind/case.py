@@ -64,7 +64,7 @@ def generator(name: str) -> tuple[Draw, tuple[str, ...]]:
         except ImportError:
             raise InputError(
                 f"--generator {name} needs the engine MuJoCo, which is not installed: "
-                'pip install "stiffness-rig[engines]". The generators "hidden" and "benches" need '
+                'install it with `pip install mujoco`. The generators "hidden" and "benches" need '
                 "nothing."
             ) from None
         if name == "mujoco":

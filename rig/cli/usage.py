@@ -34,8 +34,8 @@ def check_given_once(order: Sequence[Any], given: Mapping[str, Any]) -> None:
 
 
 def wrong_value(error: typer.BadParameter, given: Mapping[str, Any]) -> InputError | None:
-    """The message about a value that was refused; None where an argument is missing: the library's
-    own shows how the command is called."""
+    """The message about a value that was refused or is missing; None where the library has told
+    nothing of where."""
     param: Any = error.param
     option = param.opts[-1]
     if (value := given.get(param.name)) is not None:
@@ -48,8 +48,18 @@ def wrong_value(error: typer.BadParameter, given: Mapping[str, Any]) -> InputErr
                 )
         return InputError(f"{option} {value}: {_allowed(param, error.message)}.")
     if param.param_type_name == "argument":
-        return None
+        return None if error.ctx is None else _missing_argument(error.ctx, param)
     return InputError(f"{option}: is missing. Give {' or '.join(param.opts)} {_wanted(param)}.")
+
+
+def _missing_argument(ctx: Any, param: Any) -> InputError:
+    """With how the command is called."""
+    name = ctx.command.name
+    wanted = [p.metavar for p in ctx.command.params if p.param_type_name == "argument"]
+    return InputError(
+        f"rig {name}: {param.metavar} is missing. Give rig {name} {' '.join(wanted)}; "
+        f"rig {name} -h lists the options."
+    )
 
 
 def _is_flag(param: Any) -> bool:

@@ -261,10 +261,19 @@ def _gap(r: GapResult) -> dict[str, Any]:
         "after_rms_mm": r.after * MM_PER_M,
         "after_over_noise": over(r.after, r.noise),
         "shrink_factor": r.before / r.after if min(r.before, r.after) > 0 else 1.0,
-        **({} if r.written is None else {"written_after_rms_mm": r.written * MM_PER_M}),
+        **({} if r.written is None else _written(r, r.written)),
         **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM_PER_M}),
         "held_out": held[0] if held else None,
         "held_out_other": held[1:],
+    }
+
+
+def _written(r: GapResult, after: float) -> dict[str, float]:
+    """What the file of `--write-model` leaves, m."""
+    return {
+        "written_after_rms_mm": after * MM_PER_M,
+        "written_after_over_noise": over(after, r.noise),
+        "written_shrink_factor": r.before / after if min(r.before, after) > 0 else 1.0,
     }
 
 

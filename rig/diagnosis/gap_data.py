@@ -15,6 +15,7 @@ from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.running import stretches
+from rig.analysis.doubts import doubts_of_effects
 from rig.contradictions import refuse_contradictions, without_turns
 from rig.dataset import Dataset
 from rig.digits import counted
@@ -59,6 +60,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     )
     onward = unseen_ends(dataset.columns, dataset.events, used)[used]
     time, notes = _clock(np.nan_to_num(columns["time_s"].astype(float)), session, run)
+    said = (*doubts_of_effects(dataset), *_untold(onward))
     return GapData(
         arm=arm is not None,
         setups=setups,
@@ -89,7 +91,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
         onward=onward,
         aside=aside,
-        notes=(*notes, *without, *_unsettled(dataset), *_untold(onward)),
+        notes=(*notes, *without, *_unsettled(dataset), *said),
     )
 
 

@@ -78,6 +78,7 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
                     zorder=4,
                     label=f"{label}: {word}",
                 )
+    axes.use_sticky_edges = False  # the lowest bar would end on the axis, as if cut off there
     axes.set_yscale("log")
     plain_numbers(axes.yaxis)
     axes.set_xticks(x)

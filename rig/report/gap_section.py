@@ -99,7 +99,7 @@ def _effects(found: Node) -> list[Block]:
         head: tuple[Cell, ...] = (
             Word(name, "strong"),
             e["probability"].probability(),
-            e["share_of_gap"].percent(),
+            e["share_of_gap"].share(),
         )
         parameters = [
             (
@@ -162,8 +162,8 @@ def _how_far(found: Node) -> Table:
     folds = [sizes["held_out"], *sizes.get("held_out_other")]
     noise, no = sizes["noise_rms_mm"].number(), NOTHING
     rows = [row("fitted", *_sizes(sizes), no, no)]
-    if written := sizes.get("written_after_rms_mm"):
-        rows.append(row("in a model file", no, written.number(), no, no, no, no))
+    if sizes.get("written_after_rms_mm"):
+        rows.append(row("in a model file", *_sizes(sizes, "written_"), no, no))
     for h in folds:
         if h:
             told = h["ci95"][0].value < h["ci95"][1].value
@@ -178,9 +178,11 @@ def _how_far(found: Node) -> Table:
     return Table(f"How far the gap shrinks (rms{'; ' * bool(told)}{told})", header, tuple(rows))
 
 
-def _sizes(node: Node) -> tuple[Rich, Rich, Rich, Rich]:
-    before, after = node["before_rms_mm"].number(), node["after_rms_mm"].number()
-    return before, after, node["after_over_noise"].number(3), node["shrink_factor"].number(3)
+def _sizes(node: Node, of: str = "") -> tuple[Rich, Rich, Rich, Rich]:
+    """Before, after, that over the noise, and by how much it shrinks. of: begins the keys."""
+    before, after = node["before_rms_mm"].number(), node[f"{of}after_rms_mm"].number()
+    over, shrinks = node[f"{of}after_over_noise"], node[f"{of}shrink_factor"]
+    return before, after, over.number(3), shrinks.number(3)
 
 
 def _next(found: Node) -> list[Block]:

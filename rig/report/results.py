@@ -75,6 +75,12 @@ class Node:
         text = f"{abs(round(shown))}" if nearly else number(shown, digits)
         return (Number(text, self.value, self.pointer, 100.0), " %")
 
+    def share(self) -> Rich:
+        """A share of what is there: what rounds to nothing is still some of it."""
+        if self.value is None or round(100.0 * self.value) > 0:
+            return self.percent()
+        return (Number("< 1", self.value, self.pointer, 100.0), " %")
+
     def probability(self) -> Rich:
         """A probability as percent, as the terminal tells it: nothing is certain, nor excluded."""
         if self.value is None:

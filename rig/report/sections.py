@@ -51,7 +51,9 @@ def _k_unit(d: Node) -> Rich:
         return (": ", d["status_text"].text())
     everywhere = len({e["step"].value for e in d["excluded"] if e["repetition"].value is None})
     single = {e["repetition"].value for e in d["excluded"]} - {None}
-    words = [f"{counted(everywhere, 'step')} not counted"] * bool(everywhere)
+    part = d["levels"]["partial"].value
+    words = ["over a part of the range"] * bool(part)
+    words += [f"{counted(everywhere, 'step')} not counted"] * bool(everywhere)
     words += [f"repetition {r} not counted in full" for r in sorted(single)]
     return (f" N/mm ({', '.join(words)})" if words else " N/mm",)
 

@@ -285,5 +285,6 @@ def split_line(text: str) -> list[str]:
 
 
 def close_match(word: str, known: Sequence[str]) -> str:
-    """A known word so near that a slip of the finger is likely; "" otherwise."""
-    return next(iter(get_close_matches(word, known, n=1, cutoff=0.85)), "")
+    """A known word so near that a slip of the finger is likely, whatever its capitals; else ""."""
+    lower = {name.lower(): name for name in known}
+    return lower.get(next(iter(get_close_matches(word.lower(), lower, n=1, cutoff=0.85)), ""), "")

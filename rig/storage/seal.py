@@ -33,9 +33,12 @@ _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 def damaged(path: Path, what: str) -> InputError:
-    """The message about a file that is not what was written."""
+    """The message about a file that is not what was written. Only a measurement that was cut short
+    keeps its journal; with that beside it the file itself is not read."""
     return InputError(
-        f"{path}: damaged: {what} Restore it from a copy, or build it anew from its journal."
+        f"{path}: damaged: {what} Restore it from a copy. Without one: lay {path.name}.journal "
+        "beside it, if the measurement was cut short, and `rig` reads that instead; import a table "
+        "again with `rig import`."
     )
 
 

@@ -34,21 +34,40 @@ from tests.conformance.effect_benches import OUTSIDE, PAIRS, of
 
 ANSWERS = {"none", "unknown"}
 
+# By where they stand, so that whoever adds a word is told where it lacks.
 TABLES = {
-    "kinds": KINDS,
-    "effects": EFFECTS,
-    "grammar of model files": gap_keys.GRAMMAR,
-    "meanings": diagnose_text.MEANING,
-    "words that are drawn": drawn.EFFECTS,
-    "laws of hidden worlds": set(hidden.FORMS) - ANSWERS,
-    "textbook": {*textbook.FORMS, "pose_error"},  # of which rivals makes a fit of its own
-    "laws of benches": (set(benches.FORMS) - ANSWERS) | NEED_ARM | {"load_misalignment"},
+    "KINDS in identification/gap/words.py": KINDS,
+    "EFFECTS in identification/gap/effects/__init__.py": EFFECTS,
+    "GRAMMAR in rig/diagnosis/gap_keys.py": gap_keys.GRAMMAR,
+    "MEANING in rig/diagnosis/diagnose_text.py": diagnose_text.MEANING,
+    "EFFECTS in rig/worlds/hidden/words.py": drawn.EFFECTS,
+    "FORMS in rig/worlds/hidden/joint_laws.py, outer_laws.py or channel_laws.py": (
+        set(hidden.FORMS) - ANSWERS
+    ),
+    # of pose_error rivals makes a fit of its own
+    "FORMS in rig/worlds/hidden/textbook.py": {*textbook.FORMS, "pose_error"},
+    "FORMS in a module of rig/worlds/benches": (
+        (set(benches.FORMS) - ANSWERS) | NEED_ARM | {"load_misalignment"}
+    ),
 }
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_table_holds_every_word(name: str) -> None:
-    assert sorted(TABLES[name]) == sorted(WORDS)
+def same_words(place: str, found: Collection[str], wanted: Collection[str]) -> None:
+    """Fails with the place, and with what lacks there or is too much."""
+    lacks, more = sorted(set(wanted) - set(found)), sorted(set(found) - set(wanted))
+    twice = sorted(word for word in set(found) if list(found).count(word) > 1)
+    said = {"lacks": lacks, "holds beside the words": more, "holds twice": twice}
+    assert not any(said.values()), f"{place}: {', '.join(f'{k} {v}' for k, v in said.items() if v)}"
+
+
+@pytest.mark.parametrize("place", TABLES)
+def test_table_holds_every_word(place: str) -> None:
+    same_words(place, TABLES[place], WORDS)
+
+
+def test_of_a_word_that_lacks_the_place_is_told() -> None:
+    with pytest.raises(AssertionError, match=r"^A in b\.py: lacks \['w'\], holds twice \['v'\]"):
+        same_words("A in b.py", ["v", "v"], ["v", "w"])
 
 
 def test_effects_come_in_the_order_of_the_words_and_under_their_own() -> None:
@@ -103,22 +122,35 @@ EITHER_SIGN = {  # all its numbers, or factors, which stand above zero by themse
     "joint_stiffness_error",
 }
 
+HERE = "tests/conformance/test_words.py"
 SIDES: dict[str, tuple[Collection[str], set[str], Collection[str]]] = {
-    "meanings without an arm": (
+    f"_OF_ONE_SPRING in rig/diagnosis/diagnose_text.py or ALIKE_WITHOUT_ARM in {HERE}": (
         diagnose_text._OF_ONE_SPRING,
         ALIKE_WITHOUT_ARM,
         set(WORDS) - NEED_ARM,
     ),
-    "drawn for the other engine": (mujoco_effects.EFFECTS, NO_HINGE, WORDS),
-    "lengths": ([w for w, e in EFFECTS.items() if e.lengths], NO_LENGTH, WORDS),
-    "not negative": ([w for w, e in EFFECTS.items() if e.not_negative], EITHER_SIGN, WORDS),
+    f"_DRAW in rig/blind/mujoco_effects.py or NO_HINGE in {HERE}": (
+        mujoco_effects.EFFECTS,
+        NO_HINGE,
+        WORDS,
+    ),
+    f"`lengths` of the effect's EFFECT or NO_LENGTH in {HERE}": (
+        [w for w, e in EFFECTS.items() if e.lengths],
+        NO_LENGTH,
+        WORDS,
+    ),
+    f"`not_negative` of the effect's EFFECT or EITHER_SIGN in {HERE}": (
+        [w for w, e in EFFECTS.items() if e.not_negative],
+        EITHER_SIGN,
+        WORDS,
+    ),
 }
 
 
-@pytest.mark.parametrize("name", SIDES)
-def test_word_is_in_the_table_or_named_as_left_out(name: str) -> None:
-    some, others, words = SIDES[name]
-    assert sorted([*some, *others]) == sorted(words)
+@pytest.mark.parametrize("place", SIDES)
+def test_word_is_in_the_table_or_named_as_left_out(place: str) -> None:
+    some, others, words = SIDES[place]
+    same_words(place, [*some, *others], words)
 
 
 @pytest.mark.parametrize("word", WORDS)
@@ -138,9 +170,9 @@ def test_laws_that_go_through_springs_name_them_in_model_files() -> None:
 
 def test_what_belongs_to_a_session_is_said_to_be_left_out() -> None:
     gone = {w for w in WORDS if not EFFECTS[w].laws.lasts}
-    assert set(gap_path._OF_SESSIONS) == gone
+    same_words("_OF_SESSIONS in rig/diagnosis/gap_path.py", gap_path._OF_SESSIONS, gone)
     chance = {c for w in WORDS if w not in gone for c in EFFECTS[w].laws.of_session}
-    assert set(gap_path._CHANCE) == chance
+    same_words("_CHANCE in rig/diagnosis/gap_path.py", gap_path._CHANCE, chance)
 
 
 @pytest.mark.parametrize("word", WORDS)
@@ -149,12 +181,14 @@ def test_what_is_of_a_session_is_a_coefficient_of_model_files(word: str) -> None
 
 
 def test_both_sides_say_alike_what_joints_show() -> None:
-    assert IN_JOINTS | {"joint_stiffness_error"} == drawn.IN_JOINTS
-    assert set(OUTSIDE) == drawn.OUTSIDE_JOINTS
+    words = "rig/worlds/hidden/words.py"
+    same_words(f"IN_JOINTS in {words}", drawn.IN_JOINTS, IN_JOINTS | {"joint_stiffness_error"})
+    outside = f"OUTSIDE in tests/conformance/effect_benches.py beside OUTSIDE_JOINTS in {words}"
+    same_words(outside, set(OUTSIDE), drawn.OUTSIDE_JOINTS)
 
 
 def test_drifts_are_drawn_with_the_clock_that_they_live_on() -> None:
-    assert drawn.ON_THE_CLOCK == DRIFTS
+    same_words("ON_THE_CLOCK in rig/worlds/hidden/words.py", drawn.ON_THE_CLOCK, DRIFTS)
 
 
 @pytest.mark.parametrize("word", WORDS)
@@ -230,7 +264,8 @@ def test_what_a_parameter_means_is_told(word: str) -> None:
     page = (Path(__file__).parents[2] / "docs" / "gap.md").read_text("utf-8")
     rows = page.partition("| parameter | meaning |")[2].partition("\n\n")[0].splitlines()
     told = {name for row in rows for name in re.findall(r"`(\w+)`", row.split(" | ")[0])}
-    assert {_ENDING.sub("", n) for n in names()[word]} <= {_ENDING.sub("", n) for n in told}
+    lacks = {_ENDING.sub("", n) for n in names()[word]} - {_ENDING.sub("", n) for n in told}
+    assert not lacks, f"the table of parameters in docs/gap.md lacks {sorted(lacks)}"
 
 
 @pytest.mark.parametrize(("word", "key"), judge.SHARED)

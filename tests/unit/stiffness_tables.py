@@ -28,6 +28,9 @@ def meta(directions: Sequence[str] = ("x", "y"), datum: str = "setup") -> Any:
         directions=dict.fromkeys(directions, (1.0, 0.0, 0.0)),
         instruments=SimpleNamespace(force=force, displacement=laser),
         datum=datum,
+        robot="none",
+        poses={},
+        simulation=None,
     )
 
 
@@ -43,6 +46,7 @@ class Table:
     complete: bool = True
     lines: tuple[str, ...] = ()
     events: list[dict[str, Any]] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
 
     @property
     def used(self) -> Any:

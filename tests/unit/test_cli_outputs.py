@@ -6,9 +6,13 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
+import typer
+from typer.core import TyperGroup
 
+from rig.cli import app, drawn, guard, kinds
 from tests.slow import slow_ones
 from tests.unit.cli_bench import Rig
 from tests.unit.report_sets import sketched
@@ -195,6 +199,20 @@ def test_a_result_replaces_its_own_kind_only_and_says_so(
             "Give another name, or move it away.\n"
         )
         assert (arm / name).read_bytes() == (arm / other).read_bytes()
+
+
+def test_of_every_place_that_is_written_to_its_kind_is_known() -> None:
+    """Without that a result of another command would be taken for an earlier one of its own."""
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    known = {*guard._READ, *guard._FOLDERS, *kinds._OF_OPTION, "output", "pdf"}  # two by ending
+    for name, command in group.commands.items():
+        assert command.callback is not None
+        hints = get_type_hints(command.callback).items()
+        paths = {option for option, hint in hints if Path in (hint, *get_args(hint))}
+        options = {str(p.name) for p in command.params if p.param_type_name == "option"}
+        assert options & paths <= known, f"rig {name}: see _OF_OPTION of kinds, _READ of guard"
+        assert "figures" not in options or name in drawn._STEMS, f"rig {name}: see _STEMS of drawn"
 
 
 DRAWN = [

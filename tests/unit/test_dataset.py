@@ -422,6 +422,18 @@ def test_a_file_that_was_cut_off(path: Path) -> None:
         load(path)
 
 
+def test_what_is_said_to_bring_a_damaged_file_back_does(tmp_path: Path) -> None:
+    path = tmp_path / "cut.h5"
+    example.write_journal(path, 4, stop=False)
+    whole = finish(path)
+    journal = journal_path(path).rename(tmp_path / "elsewhere")
+    path.write_bytes(path.read_bytes()[:5000])
+    with pytest.raises(InputError, match=r"lay cut\.h5\.journal beside it, if the measurement was"):
+        load(path)
+    journal.rename(journal_path(path))
+    assert equal(load(path), whole)
+
+
 def _broken(raw: bytes, seed: int) -> bytes:
     """Bits flipped, cut off, zeros or noise written over."""
     rng, data = random.Random(seed), bytearray(raw)

@@ -141,3 +141,13 @@ def test_the_architecture_names_every_module_of_the_identification() -> None:
     files = [p for p in home.glob("**/*.py") if p.parent != home / "gap" / "effects"]
     names = {p.stem for p in files} - {"__init__"}
     assert sorted(n for n in names if not re.search(rf"\b{n}\b", text)) == []
+
+
+SOURCES = [p for folder in ("rig", "drivers") for p in sorted((HOME / folder).rglob("*.py"))]
+
+
+def test_nobody_is_told_to_fetch_this_program_by_its_name() -> None:
+    """It is on no index: whoever registers the name there first would be installed."""
+    by_name = re.compile(r"pip install[^`\n]*\bstiffness-rig\b")
+    found = {name_of(page): by_name.findall(page.read_text("utf-8")) for page in SOURCES + PAGES}
+    assert {page: told for page, told in found.items() if told} == {}

@@ -39,6 +39,22 @@ def test_what_had_not_settled_is_said(tmp_path: Path, origin: Origin, advice: st
     assert advice in note
 
 
+def test_what_makes_k_doubtful_is_said_of_the_diagnosis_too(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(META)
+    late = TABLE.replace("displacement_mm\n", "displacement_mm,slots_missed,settled\n")
+    rows = late.splitlines()
+    told = [rows[0], *(f"{row},{int(i == 3)},{int(i != 9)}" for i, row in enumerate(rows[1:]))]
+    told[6] = "16,1,zero,0,11.0,0.0,20,1"  # at the end of the first run, which goes up to 100 N
+    (tmp_path / "t.csv").write_text("\n".join(told) + "\n")
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    missed, still, zero = gap_data(load(tmp_path / "d.h5")).notes
+    assert missed.startswith("54 % of the sampling slots were missed (21 of 39)")
+    assert missed.endswith("leaves what looks like lost motion, friction or a joint that gave way.")
+    assert still.startswith("1 of 14 levels had not settled when they were sampled. What still")
+    assert zero.startswith("The force at zero load moved by 11.0 N within a run (x, repetition 1)")
+    assert zero.endswith("look for what did it before you believe in an effect of the rig.")
+
+
 def test_a_repetition_that_was_resumed_midway_is_set_aside(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(TABLE)
     (tmp_path / "m.yaml").write_text(META)

@@ -225,7 +225,8 @@ def test_a_damaged_copy_of_a_known_file_is_left_out(folder: Path) -> None:
     assert "copy.h5" not in {e.file for e in found.entries}
     assert dict(found.skipped)["copy.h5"] == (
         "damaged: its bytes have changed since it was written. "
-        "Restore it from a copy, or build it anew from its journal."
+        "Restore it from a copy. Without one: lay copy.h5.journal beside it, if the measurement "
+        "was cut short, and `rig` reads that instead; import a table again with `rig import`."
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.stiffness import analyze_curve
+from rig.analysis.analyze import analyze
 from rig.dataset import Dataset
 from rig.diagnosis.diagnose import diagnose
 from rig.diagnosis.gap_data import gap_data
@@ -25,6 +26,42 @@ def notes(dataset: Dataset) -> list[str]:
 def test_nothing_is_said_of_what_is_right(name: str) -> None:
     design = DESIGNS[name]
     assert notes(imported(noisy(design), meta(design))) == []
+
+
+# ------------------------------------------------------------------ units and signs
+
+
+@pytest.mark.parametrize("name", ["medium", "bench"])
+def test_a_displacement_in_micrometres_is_told_at_import_and_beside_k(name: str) -> None:
+    design = DESIGNS[name]
+    rows = noisy(design)
+    rows["displacement_mm"] *= 1000
+    dataset = imported(rows, meta(design))
+    said = notes(dataset)
+    assert len(said) == len(curves(dataset))
+    for note in said:
+        assert "Are these displacements in um or forces in kN? Check the units of force_N" in note
+    minded = analyze(dataset).notes
+    assert [f"{note}." for note in said] == [m for m in minded if "META's simulation says" in m]
+
+
+@pytest.mark.parametrize("name", ["medium", "bench"])
+def test_a_sign_that_is_turned_is_told_with_what_to_do(name: str) -> None:
+    design = DESIGNS[name]
+    rows = noisy(design)
+    rows["displacement_mm"] *= -1
+    dataset = imported(rows, meta(design))
+    turned = [
+        note for note in notes(dataset) if "displacement_mm falls while force_N rises" in note
+    ]
+    assert len(turned) == len(curves(dataset))
+    assert all(note.endswith("turn the sign of the one that does not") for note in turned)
+    for direction in analyze(dataset).directions.values():
+        assert direction.result.sentence == (
+            "The displacement falls while the force rises: k is negative. Unless what was loaded "
+            "gave way there, one of the two has the wrong sign: turn the one that does not count "
+            "along the direction."
+        )
 
 
 # ------------------------------------------------------------------ channels with a column missing
@@ -124,7 +161,9 @@ def test_a_run_that_lacks_many_steps_is_a_running_recording(share: float) -> Non
 def test_a_force_that_is_not_its_components(factor: float) -> None:
     rows = noisy(RICH)
     rows.loc[rows.direction == "y", "force_N"] *= factor
-    (said,) = notes(imported(rows, meta(RICH)))
+    said, *turned = notes(imported(rows, meta(RICH)))
+    assert all("falls while force_N rises" in note for note in turned)
+    assert bool(turned) == (factor < 0)
     shown = {1.2: "1.2", -1.0: "-1", 0.0: "0"}[factor]
     assert said == (
         f"direction y: force_N is {shown} times what force_x_N, force_y_N and force_z_N are along "

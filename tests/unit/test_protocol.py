@@ -168,6 +168,12 @@ def test_a_bad_name_is_refused() -> None:
         parse_protocol(text, PATH)
 
 
+def test_steps_without_a_value_are_said_with_other_values_that_are_wrong() -> None:
+    levels = "steps_N: [7.5, 15, 22.5, 30, 37.5, 45, 52.5, 60, 67.5, 75, 78, 82]"
+    found = said(("\nrepetitions: 3", "\n#"), ("rest_s: 10", "rest_s: ten"), (levels, "steps_N: "))
+    assert [line.split(":")[0] for line in found] == ["repetitions", "runs[1]", "rest_s"]
+
+
 def test_three_mistakes_are_one_message_with_their_places() -> None:
     text = changed(
         ("repetitions: 3", "repetitons: 3"),

@@ -167,6 +167,14 @@ def test_shares_as_percent(share: float, text: str) -> None:
     assert shown_text.text == text
 
 
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.0, "< 1 %"), (0.004, "< 1 %"), (0.04, "4.00 %"), (1.0, "100 %")]
+)
+def test_an_effect_that_is_there_does_something_to_the_gap(share: float, text: str) -> None:
+    shown = "".join(c if isinstance(c, str) else c.text for c in Node(share).share())
+    assert shown == text
+
+
 @pytest.mark.parametrize("p", [0.0, 0.004, 0.5, 0.934, 0.996, 1.0])
 def test_probabilities_are_told_as_on_the_terminal(p: float) -> None:
     shown_text = "".join(c if isinstance(c, str) else c.text for c in Node(p).probability())

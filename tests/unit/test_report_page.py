@@ -33,7 +33,7 @@ from rig.report.document import (
     figures,
 )
 from rig.report.drawing import alone, style, svg_of
-from rig.report.gap_section import _effects
+from rig.report.gap_section import _effects, _how_far
 from rig.report.gather import gather
 from rig.report.html import escape, render
 from rig.report.measured_section import _places
@@ -280,6 +280,24 @@ def test_a_parameter_whose_name_misleads_is_explained() -> None:
     blocks = tuple(_effects(Node({"effects": [one], "parameter_meanings": told}, "/gap")))
     text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
     assert "share_through_friction: it may pass 1." in text
+
+
+def test_what_a_model_file_leaves_is_told_in_full() -> None:
+    gap = {
+        "noise_rms_mm": 0.002,
+        "before_rms_mm": 0.08,
+        "after_rms_mm": 0.004,
+        "after_over_noise": 2.0,
+        "shrink_factor": 20.0,
+        "written_after_rms_mm": 0.01,
+        "written_after_over_noise": 5.0,
+        "written_shrink_factor": 8.0,
+        "held_out": None,
+        "held_out_other": [],
+    }
+    _, written, _ = _how_far(Node({"gap": gap}, "/diagnose")).rows
+    texts = [c if isinstance(c, str) else getattr(c[0], "text", c[0]) for c in written]
+    assert texts == ["in a model file", "0.08000", "0.01000", "5.00", "8.00", "-", "-"]
 
 
 def test_what_many_runs_have_to_themselves_is_its_range() -> None:

@@ -81,6 +81,17 @@ def test_displacements_without_load_have_a_unit_that_suits_them(
     assert axes.lines[0].get_ydata()[1] == pytest.approx(-shown)
 
 
+def test_no_bar_of_the_joints_ends_on_the_axis() -> None:
+    prior = {"joint_stiffness_Nm_per_rad": [6e4] * 3 + [8e3] * 3, "relative_sd": [0.35] * 6}
+    springs = [{"value": 4e4, "ci95": [3e4, 5e4]}] * 3 + [{"value": 8e3, "ci95": [4.1e3, 15e3]}] * 3
+    found = {"prior": prior, "joint_stiffness_Nm_per_rad": springs, "identified": [True] * 6}
+    (axes,) = figures.joints([("arm.h5", found)], []).axes
+    low, high = axes.get_ylim()
+    ends = [end for bar in axes.patches for end in (bar.get_y(), bar.get_y() + bar.get_height())]
+    assert low < 0.99 * min(ends)
+    assert 1.01 * max(ends) < high
+
+
 def test_figures_bear_the_name_of_their_data_set() -> None:
     quality = figures.quality("arm.h5", dataset(), ())
     assert [t.get_text() for t in quality.texts] == ["EMULATED", "arm.h5"]

@@ -126,6 +126,20 @@ def test_a_gain_moves_the_levels_of_a_curved_line() -> None:
     assert gain_effect(bent, Choice(), 0.01) / k == pytest.approx(0.02, rel=1e-3)
 
 
+def test_a_gain_that_is_worth_more_than_stated_is_told_with_its_share() -> None:
+    stated = (0.005, 0.003)
+    bent = analyze_curve(curve(lambda f: f / 1e5 * (1 + f / 200), gains=stated))
+    (gain,) = (c for c in bent.budget if c.name == "gain of the force")
+    note = (
+        f"The gain of the force is stated to 0.5 %, and is worth {100 * gain.u / k_of(bent):.3g} "
+        "% of k: it moves the levels, too, over which a curve that is not straight is averaged."
+    )
+    assert note in bent.notes
+    assert gain.u / k_of(bent) > 1.1 * stated[0]
+    straight = analyze_curve(curve(gains=stated))
+    assert not [n for n in straight.notes if "gain of the force" in n]
+
+
 def test_pointwise_stiffness_mean_and_sd_over_the_repetitions() -> None:
     result = analyze_curve(curve())
     each = 1e5 / np.array(FACTORS)

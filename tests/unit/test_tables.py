@@ -141,6 +141,18 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["Branch", "Step", "Pose", "Session_s"])
+def test_a_column_in_capitals_is_not_passed_over(tmp_path: Path, name: str) -> None:
+    table = TABLE.replace(name.lower(), name, 1)
+    notes = [e["text"] for e in bring(tmp_path, table).events if e["kind"] == "note"]
+    assert notes[0] == f'column "{name}" is kept and ignored; is "{name.lower()}" meant?'
+
+
+def test_a_missing_direction_may_stand_there_in_capitals(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'2: x, y\. Rename the column "Direction", or leave one'):
+        bring(tmp_path, TABLE.replace("direction", "Direction", 1))
+
+
 @pytest.mark.parametrize(
     ("steps", "kept", "note"),
     [
