@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
+from identification.gap.words import IN_JOINTS, SPRINGS
 from rig.digits import brief, likely
 from rig.units import MM_PER_M
 
@@ -60,17 +61,27 @@ _STIFFER = "how stiff the friction is until it slips, over the spring's stiffnes
 _BEYOND = "slope_beyond_over_elastic"
 _ADDED = "compliance added beyond the threshold, over the elastic one; 1: twice as soft there"
 _LOST = "stiffness lost beyond the threshold, over the elastic one; 1: none is left there"
+_NAMES = {
+    "creep_fraction": "what creeps in the end, over the elastic deflection",
+    "creep_fraction_of_run": "the same once a load has stood for `run`, the mean length of a run",
+}
+_BENDS = "change_of_compliance_over_range"
+_SOFTER = "compliance at the largest load less that at none, over that at none"
+_WEAKER = "share of the stiffness at no load that is lost at the largest stroke"
 
 
 def parameter_meanings(r: GapResult) -> dict[str, str]:
-    """Parameter -> what its number is, of those found that need it. Of a rig without an arm whose
-    displacement is imposed, springs and friction are stiffnesses beside each other."""
-    found = {name for e in r.effects for name in e.parameters} & {_SHARE, _BEYOND}
-    if not found:
-        return {}
+    """Parameter -> what its number is, of those found whose name alone does not say it. Of a rig
+    without an arm whose displacement is imposed, springs and friction are stiffnesses beside each
+    other."""
     beside = not r.bench.data.arm and r.bench.imposed
-    each = {_SHARE: _STIFFER, _BEYOND: _LOST} if beside else {_SHARE: _HELD_BACK, _BEYOND: _ADDED}
-    return {name: told for name, told in each.items() if name in found}
+    found = {name for e in r.effects for name in e.parameters}
+    told = (
+        {_SHARE: _STIFFER, _BEYOND: _LOST, _BENDS: _WEAKER}
+        if beside
+        else {_SHARE: _HELD_BACK, _BEYOND: _ADDED, _BENDS: _SOFTER}
+    )
+    return {name: meaning for name, meaning in {**told, **_NAMES}.items() if name in found}
 
 
 # What is said in place of a word's meaning.
@@ -215,8 +226,10 @@ def answer(
         )
     more = [name for name in dict.fromkeys(names) if name != verdict]
     beside = f" Beside it: {', '.join(more)}." if more else ""
+    them = "all of them" if more else "it"
     return (
-        f"{meaning}.{beside} With it the gap shrinks from {{before}} to {{after}} mm rms; {alone}"
+        f"{meaning}.{beside} With {them} the gap shrinks from {{before}} to {{after}} mm rms; "
+        f"{alone}"
     )
 
 
@@ -231,9 +244,12 @@ def _where(r: GapResult) -> str:
     lines.append(f"  branches    {', '.join(w.branches)}")
     lines.append(f"  repetitions {', '.join(map(str, w.repetitions))}")
     if w.joints:
-        lines.append(f"  joints      {', '.join(map(str, w.joints))}")
+        theirs = [name for name in r.names if name in IN_JOINTS | {SPRINGS}]
+        whose = "" if r.verdict in theirs else f" ({', '.join(theirs)})"
+        lines.append(f"  joints      {', '.join(map(str, w.joints))}{whose}")
     if w.seen_by_encoders is not None:
-        lines.append(f"  the joint readings {'see' if w.seen_by_encoders else 'do not see'} it")
+        what = r.verdict if len(r.names) > 1 else "it"
+        lines.append(f"  the joint readings {'see' if w.seen_by_encoders else 'do not see'} {what}")
     return "\n".join(lines)
 
 
