@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ def text(result: IdentifyResult) -> str:
         *result.banners,
         f"Joint torsional stiffness of the {result.arm.name} from {len(result.observations)} "
         f"poses and directions; rank {fit.rank}, null space of dimension {6 - fit.rank}, "
-        f"condition number {fit.condition_number:.3g}.",
+        f"condition number {_condition(fit.condition_number)}.",
         "  joint  kNm/rad     u    95 % interval    from data  at least",
     ]
     for j in range(6):
@@ -43,7 +44,11 @@ def text(result: IdentifyResult) -> str:
         )
     prior_sd = dict.fromkeys(f"{100 * sd:.4g}" for sd in fit.prior.relative_sd)
     known = numbers(100 * fit.prior.relative_sd, 4) if len(prior_sd) > 1 else next(iter(prior_sd))
-    lines.append(f"Prior: {fit.prior.source}, relative sd {known} %. u: standard uncertainty.")
+    lines.append(
+        f"Prior: {fit.prior.source}, relative sd {known} %. u: standard uncertainty. from data: "
+        "share that data tell, not the prior. at least (kNm/rad, 95 %): whatever the other joints "
+        "are; -: these data set no bound."
+    )
     lines += [f"See to this first: {doubt}" for doubt in result.doubts]
     if result.proposals:
         lines.append("Next poses that would tell most, in this order:")
@@ -54,6 +59,10 @@ def text(result: IdentifyResult) -> str:
             )
     lines += [f"Note: {note}" for note in result.notes]
     return "\n".join(lines)
+
+
+def _condition(number: float) -> str:
+    return f"{number:.3g}" if isfinite(number) else "infinite (without the prior)"
 
 
 def model_text(result: IdentifyResult) -> str:
