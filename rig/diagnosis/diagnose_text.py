@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
-from identification.gap.words import IN_JOINTS, SPRINGS
 from rig.digits import brief, likely
 from rig.units import MM_PER_M
 
@@ -234,6 +233,8 @@ def answer(
 
 
 def _where(r: GapResult) -> str:
+    from identification.gap.words import IN_JOINTS, SPRINGS
+
     w = r.where
     if not w.directions or not any(force != (0.0, 0.0) for force in w.force.values()):
         return ""

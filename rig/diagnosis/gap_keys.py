@@ -58,6 +58,7 @@ CONSTANTS: dict[str, Key] = {
     "memory": _MEMORY,
     "forgets": Key("memory", "text", options=(ANEW,)),
     joint_creep.STOOD_ON: Key(joint_creep.STOOD_ON, "share"),
+    joint_creep.RESTED: Key("rest_between_runs_s", "size"),
     "flow_time": Key("flow_time_s", "size"),
     "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=tuple(base_slip.AXES)),
@@ -172,6 +173,7 @@ MAY_BE_MISSING = (
     "placed",
     "forgets",
     joint_creep.STOOD_ON,
+    joint_creep.RESTED,
     "only_in",
     "unread",
     AS_IT_STANDS,
@@ -268,7 +270,7 @@ GRAMMAR: dict[str, Grammar] = {
         ),
     ),
     "joint_creep": Grammar(
-        ("joint", "forgets", joint_creep.STOOD_ON, AS_IT_STANDS),
+        ("joint", "forgets", joint_creep.STOOD_ON, joint_creep.RESTED, AS_IT_STANDS),
         (
             ("compliance", ("retardation_time",)),
             ("compliance_quadratic", ("retardation_time",)),

@@ -6,7 +6,8 @@ of them so long that it flows and does not come back (Burgers 1935). Large stres
 in proportion: the same of the squared torque. The coefficients are compliances in units of the
 joint's own, of what flows over one run: polymers, grease and gears 1 to 50 %.
 
-What crept goes back between two runs, as the session's clock tells; or nothing is left of it where
+What crept goes back between two runs, as the session's clock tells, or, without one, for minutes
+or less; or nothing is left of it where
 the rig is turned to another direction, which may take hours that no clock counts.
 
 Size: 1 to 50 % of the elastic deflection: polymers, grease, gears.
@@ -17,6 +18,7 @@ Source: Findley 1976.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -91,7 +93,13 @@ def variants(bench: Bench) -> list[Variant]:
             info = {"joint": j, "memory": memory.strip(), "bent": False}
             name, likely = f"joint {j + 1}{memory}", _LIKELY[memory]
             pairs = (0.3 if bench.data.arm else 0.5) * likely
-            out += _family(name, columns, spectrum, sizes, 0.5 * likely, pairs, info)
+            other = _other_rests(bench)
+            whole = 0.5 * likely / (1 + len(other))
+            out += _family(name, columns, spectrum, sizes, whole, pairs, info)
+            for rested in other:
+                columns = _elements(bench, j, spectrum, fresh, rested=rested)
+                called, told = f"{name} after rests of {rested:g} s", {**info, "rested": rested}
+                out.append(_spectrum(called, columns, spectrum, sizes, whole, told))
         if (
             bench.data.arm or not bench.load_history.one_rate
         ):  # else it would be a loop of any shape
@@ -120,11 +128,12 @@ def _elements(
     *,
     is_bent: bool = False,
     stood: float = 0.0,
+    rested: float | None = None,
 ) -> list[int]:
-    """Column of an element of every time (k,). stood: as in `phases_of`."""
+    """Column of an element of every time (k,). stood, rested: as in `phases_of`."""
     load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times_s)))
     load = signed_squares(load) if is_bent else load
-    z = retarded(load, times_s, bench.rows, bench.rest, fresh, stood)
+    z = retarded(load, times_s, bench.rows, bench.rest, fresh, stood, rested)
     unit = bench.sense * bench.compliance[joint] * in_a_run(bench, times_s)
     return [bench.add_joint(joint, y) for y in (unit * z).T]
 
@@ -139,21 +148,31 @@ def _family(
     info: dict[str, Any],
 ) -> list[Variant]:
     """The whole spectrum, and each time with its neighbour, of these priors."""
-    out = [
-        variant(
-            WORD,
-            f"{name} spectrum",
-            columns,
-            sizes,
-            root=smooth_root(len(columns), 0.5),
-            prior=spectrum,
-            each=True,
-            form="spectrum",
-            times_s=times_s,
-            **info,
-        )
-    ]
-    return out + _pairs(name, columns, times_s, sizes, pairs, info)
+    whole = _spectrum(name, columns, times_s, sizes, spectrum, info)
+    return [whole, *_pairs(name, columns, times_s, sizes, pairs, info)]
+
+
+def _spectrum(
+    name: str,
+    columns: list[int],
+    times_s: Array,
+    sizes: tuple[float, ...],
+    prior: float,
+    info: dict[str, Any],
+) -> Variant:
+    """All times, neighbours alike."""
+    return variant(
+        WORD,
+        f"{name} spectrum",
+        columns,
+        sizes,
+        root=smooth_root(len(columns), 0.5),
+        prior=prior,
+        each=True,
+        form="spectrum",
+        times_s=times_s,
+        **info,
+    )
 
 
 def _pairs(
@@ -188,15 +207,34 @@ def refined(bench: Bench, found: Variant, _: float = 1.0) -> list[Variant]:
     times_s = low * STEP ** np.arange(-1, round(between) + 2)
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     is_bent, fresh = bool(found.info["bent"]), bench.rebuilt if memory else None
-    shares = STOOD if _unloads_unseen(bench) else STOOD[:1]
-    prior, out = _FINE_PRIOR * found.prior / len(shares), list[Variant]()
-    for stood in shares:
+    rests = list(_rests(bench))
+    prior, out = _FINE_PRIOR * found.prior / len(rests), list[Variant]()
+    for stood, rested in rests:
         name = f"joint {joint + 1}{' ' * bool(memory)}{memory}{BENT * is_bent} fine"
         name += f" stood on for {stood:g} of the rest" * (stood > 0)
-        info = {"joint": joint, "memory": memory, "bent": is_bent, "stood": stood}
-        columns = _elements(bench, joint, times_s, fresh, is_bent=is_bent, stood=stood)
+        name += "" if rested is None else f" of {rested:g} s"
+        info = {"joint": joint, "memory": memory, "bent": is_bent, "stood": stood, "rested": rested}
+        columns = _elements(
+            bench, joint, times_s, fresh, is_bent=is_bent, stood=stood, rested=rested
+        )
         out += _pairs(name, columns, times_s, found.scales, prior, info)
     return out
+
+
+def _rests(bench: Bench) -> Iterator[tuple[float, float | None]]:
+    """What may have been in the rests between runs: for which share of it the load stood on, where
+    no row shows when it was taken off; and how long it took (s)."""
+    for stood in STOOD if _unloads_unseen(bench) else STOOD[:1]:
+        yield stood, None
+        yield from ((stood, rested) for rested in _other_rests(bench))
+
+
+def _other_rests(bench: Bench) -> tuple[float, ...]:
+    """s that rests between runs may have taken, beside the minutes that are taken for them, where
+    no clock of the session was recorded."""
+    rows = bench.rows
+    unknown = not rows.clock and not rows.continuous and bool(np.any(bench.rest[1:]))
+    return RESTS_S if unknown else ()
 
 
 def _unloads_unseen(bench: Bench) -> bool:
@@ -208,6 +246,8 @@ def _unloads_unseen(bench: Bench) -> bool:
 _LOADED = 0.2  # of the largest load, from which a last reading is no longer one without
 STOOD_ON = "share_of_rest_stood_on"  # in the constants of a law
 STOOD = (0.0, 0.5, 1.0)  # shares of such a rest for which the load stood on
+RESTED = "rest_between_runs"  # s, in the constants of a law
+RESTS_S = (20.0, 60.0)  # beside the minutes that are taken for them
 STEP = 3.0**0.25  # from time to time of a closer look
 _SEEN_TO = 9.0  # times the last time that ends, up to where flowing is one with it
 _FINE_PRIOR = 1.5  # of them all, over that of the pair, of which they reach over one and a half
@@ -297,6 +337,7 @@ def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     terms = tuple(Term(name, {"retardation_time": float(t)}) for t in times)
     more: dict[str, Any] = {"forgets": ANEW} if v.info["memory"] else {}
     more |= {STOOD_ON: v.info["stood"]} if v.info.get("stood") else {}
+    more |= {RESTED: v.info["rested"]} if v.info.get("rested") else {}
     return Law({"joint": joint} | more, terms), unit * in_a_run(bench, times)
 
 
@@ -308,8 +349,8 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     torque = bench.true_torque[:, joint][:, None]
     load = np.where(bent, torque * np.abs(torque), torque)
     fresh = bench.rebuilt if law.constants.get("forgets") == ANEW else None
-    stood = float(law.constants.get(STOOD_ON, 0.0))
-    z = retarded(load, times, bench.rows, bench.rest, fresh, stood)
+    stood, rested = float(law.constants.get(STOOD_ON, 0.0)), law.constants.get(RESTED)
+    z = retarded(load, times, bench.rows, bench.rest, fresh, stood, rested)
     return [bench.joint_column(joint, bench.sense * column) for column in z.T]
 
 

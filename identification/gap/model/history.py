@@ -14,7 +14,7 @@ from math import exp
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.recording.rows import Rows
+from identification.gap.recording.rows import REST_S, Rows
 
 _FAR = 0.2  # share of the load's range: a run that starts and ends beyond it was not unloaded
 
@@ -152,10 +152,13 @@ class Phases:
     stands: Array
 
 
-def phases_of(rows: Rows, rest: Flags, stood: float = 0.0) -> Phases:
+def phases_of(rows: Rows, rest: Flags, stood: float = 0.0, rested: float | None = None) -> Phases:
     """Of every row; rest (n,): before which the load went back to zero. stood: share of a rest for
-    which the old load stood on, which no row shows."""
+    which the old load stood on, which no row shows. rested: s between two runs, where no clock of
+    the session was recorded; None: as `Rows.session` has it."""
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
+    if rested is not None and not rows.clock:
+        step += np.where(rows.starts & (step > 0), rested - REST_S, 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(time_under_load(rows), ease)
     pause = np.minimum(hold_time_after_row(rows), np.where(rest, step - ease, ease - stands))
@@ -171,16 +174,17 @@ def retarded(
     rest: Flags,
     fresh: Flags | None = None,
     stood: float = 0.0,
+    rested: float | None = None,
 ) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,), or one (1,) for all:
     deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps
     between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten.
-    stood: as in `phases_of`."""
+    stood, rested: as in `phases_of`."""
     old = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
     if fresh is not None:
         old[fresh] = 0.0
     before = np.where(rest[:, None], 0.0, old)
-    phases = phases_of(rows, rest, stood)
+    phases = phases_of(rows, rest, stood, rested)
     # z_i = keep_i z_{i-1} + gain_i: the old load standing on, a rest; a ramp to the new load, then
     # standing there. What there was goes back all the while.
     paused = np.exp(-phases.pause[:, None] / times)
