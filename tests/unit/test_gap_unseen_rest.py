@@ -81,6 +81,26 @@ def test_nothing_is_left_where_memory_is_fresh(stood: float) -> None:
     assert abs(z[first, 0]) < 0.1
 
 
+def test_a_rest_that_no_clock_tells_has_the_length_that_is_asked_for() -> None:
+    """As the session's clock has it; where there is one, that counts."""
+    data = loaded_only(0.0, creeps=1.0)
+    told, untold = (make_bench(d).rows for d in (data, replace(data, session=None)))
+    load, times = told.force[:, None], np.array([T_S])
+    wanted = retarded(load, times, told, rests(told))
+    start = data.session[data.run == 1][0] - data.session[data.run == 0][-1]
+    found = retarded(load, times, untold, rests(untold), rested=float(start))
+    assert found == pytest.approx(wanted, abs=0.2)
+    assert np.abs(retarded(load, times, untold, rests(untold)) - wanted).max() > 20.0
+    assert np.array_equal(retarded(load, times, told, rests(told), rested=900.0), wanted)
+
+
+def test_creep_is_known_without_a_clock_of_the_session() -> None:
+    found = explained(replace(loaded_only(0.0), session=None))
+    assert found.verdict == "joint_creep"
+    law = joint_creep.EFFECT.laws.of(found.bench, found.fit.parts[0].variant)[0]
+    assert law.constants[joint_creep.RESTED] == 20.0  # of 25
+
+
 @pytest.mark.parametrize("stood", [0.0, 1.0])
 def test_creep_is_known_whenever_the_load_was_taken_off(stood: float) -> None:
     found = explained(loaded_only(stood))
