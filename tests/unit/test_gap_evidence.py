@@ -30,6 +30,7 @@ from identification.gap.evidence.table import EvidenceTable
 from identification.gap.explanations.explanation import conditioned
 from identification.gap.explanations.fit import _holds
 from identification.gap.explanations.priors import prior_of
+from identification.gap.explanations.verdict import with_posterior
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import variant
@@ -224,7 +225,7 @@ def test_probabilities_cover_all_words_and_sum_to_one() -> None:
     base = base_columns(bench)
     variants = library(bench)
     engine = Engine(bench, base, bench.observed - prediction(bench), np.array([0.0, 1e-6, 3e-6]))
-    found = search(engine, variants)
+    found = with_posterior(search(engine, variants), {})
     assert set(found.probabilities) == {*WORDS, "none", "unknown"}
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
     assert found.explanations[0].parts == ()  # a spring 10 % off, stated within 10 %

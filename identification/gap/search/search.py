@@ -22,7 +22,6 @@ from identification.gap.explanations.explanation import (
 )
 from identification.gap.explanations.priors import LOG_NONE, log_unknown
 from identification.gap.explanations.several import in_more_joints, in_one_joint_each, polished
-from identification.gap.explanations.verdict import with_posterior
 from identification.gap.model.noise import UNSURE
 from identification.gap.model.variants import Variant, able_beside
 from identification.gap.search.mechanisms_refit import refit_mechanism_variants
@@ -52,7 +51,8 @@ def search(
 ) -> SearchResult:
     """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
     repeat from run to run, a third effect is but freedom of the other two's laws. singles: scores
-    of the variants one by one, where they are known."""
+    of the variants one by one, where they are known. Probabilities come with what is judged
+    (`judging.residual_checks`)."""
     deepest = 2 if engine.bench.rows.continuous else 3
     levels, all_of_them = engine.levels, list(variants)
     families = by_word(singles or score(engine, levels, all_of_them))
@@ -85,7 +85,7 @@ def search(
     strange = {
         lv.eta: _base_at(engine, lv.number) for lv in engine.levels if lv.eta > _hidden(engine)
     }
-    found = SearchResult(
+    return SearchResult(
         engine=engine,
         explanations=named,
         unmodelled=tuple(e for e in ranked if e not in named),
@@ -95,7 +95,6 @@ def search(
         unknown_eta=max(strange, key=lambda eta: strange[eta]),
         variants=tuple(all_of_them),
     )
-    return with_posterior(found, {})
 
 
 def _as_stated(engine: Engine) -> float:

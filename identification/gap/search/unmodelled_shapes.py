@@ -25,7 +25,7 @@ from identification.gap.evidence.factor import span_of
 from identification.gap.evidence.parts import Part, part_sizes
 from identification.gap.explanations.explanation import PLAIN, GapPattern, SearchResult
 from identification.gap.explanations.priors import log_unknown
-from identification.gap.explanations.verdict import TAKES_TWO, with_posterior
+from identification.gap.explanations.verdict import TAKES_TWO
 from identification.gap.laws.drift import by_direction, free_path, path_root, waited
 from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
@@ -63,7 +63,7 @@ def with_unmodelled_evidence(found: SearchResult) -> SearchResult:
     shares = [1.0, *(1.0 / KINDS for _ in alike)]
     unknown = log_mean([none, *(a.log_evidence for a in alike)], shares)
     plain = next((a for a in alike if a.log_evidence > none + PLAIN), None)
-    return with_posterior(replace(found, unknown=unknown + prior, looks_like=plain), found.kept)
+    return replace(found, unknown=unknown + prior, looks_like=plain)
 
 
 def _creeps(found: SearchResult, settles: float) -> bool:
