@@ -29,8 +29,8 @@ from identification.gap.explanations.verdict import (
     tolerated_misfit,
     with_posterior,
 )
+from identification.gap.judging.creep_or_lag import but_lags
 from identification.gap.judging.dead_zone import spoken_for
-from identification.gap.judging.late import but_lags
 from identification.gap.judging.limit_violation import limit_violation
 from identification.gap.judging.paths import is_implausible_drift
 from identification.gap.judging.prior_conflict import LIMIT, most_off, prior_conflict

@@ -25,10 +25,10 @@ from identification.gap.explanations.several import in_more_joints, in_one_joint
 from identification.gap.model.noise import UNSURE
 from identification.gap.model.variants import Variant, able_beside
 from identification.gap.search.mechanisms_refit import refit_mechanism_variants
+from identification.gap.search.pose_refit import refit_pose_variants
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
 from identification.gap.search.springs_refit import relinearised_variants
-from identification.gap.search.standing import standing_anew
 from identification.gap.words import MECHANISMS, SPRINGS, UNMODELLED
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
@@ -348,7 +348,7 @@ def _read_and_placed(engine: Engine, start: Explanation) -> list[Variant]:
     """What reads all that moves, stands elsewhere, or goes through springs that are off."""
     return [
         *reading_all(engine, start),
-        *standing_anew(engine, start),
+        *refit_pose_variants(engine, start),
         *relinearised_variants(engine, start),
     ]
 

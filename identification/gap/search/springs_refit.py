@@ -18,7 +18,7 @@ _MOVED = 0.02  # of a spring: less is no other variant
 def relinearised_variants(engine: Engine, explanation: Explanation) -> list[Variant]:
     """Variants of such effects in an explanation that leaves more than noise; the pool of the bench
     holds their columns afterwards. None where springs are where they were. Where arm and tool stand
-    is found with the springs anyway (`standing_anew`)."""
+    is found with the springs anyway (`refit_pose_variants`)."""
     bench, out = engine.bench, []
     for part in explanation.parts if explanation.eta > 0 else ():
         effect = EFFECTS.get(part.word)  # a trouble that no word names has none

@@ -9,7 +9,7 @@ from identification.gap.explanations.explanation import Explanation
 from identification.gap.model.variants import Variant
 
 
-def standing_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
+def refit_pose_variants(engine: Engine, explanation: Explanation) -> list[Variant]:
     """Variants of a wrong pose in an explanation, through where it is found to be beside the other
     effects; the pool of the bench holds their columns afterwards. None where it is alone, or stands
     there already."""
