@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from math import log
 
+# Times as stiff as simulated, or so small a part: more is most often another unit. Of 1300
+# recordings, of rigs and of their simulations, none was off by more than twenty where the response
+# is a line for the most part.
+FAR = 50.0
+LINE = 0.5  # of its square, that the force explains, from which a response is such a line
 # A stiffness is so many times what it is where a column is in these units, not in N and mm.
 _UNITS = {
     1e-3: "displacements in um or forces in kN",

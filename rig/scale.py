@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.arm import tool_offset
 from identification.arrays import Flags
-from identification.slips import slip
+from identification.slips import FAR, LINE, slip
 from rig.digits import brief
 from rig.measurements import Stated
 from rig.models.robot import load_robot
@@ -18,9 +18,6 @@ from rig.runs import of_setup
 from rig.storage.columns import Values
 from rig.units import MM_PER_M, N_PER_MM
 
-# As for diagnoses (`identification.gap.answer.scale`), which have the figures behind the first two.
-_FAR = 50.0  # times as stiff as simulated, or a fiftieth
-_ALIKE = 0.5  # of the displacement's square goes with the force
 _SEEN = 20.0  # standard uncertainties of one sample: a channel that goes less far has no slope
 _U_LOG_FACTOR = 0.2  # of a stiffness beside a simulation that is not in doubt otherwise
 
@@ -40,7 +37,7 @@ def off_scale(meta: Stated, columns: Mapping[str, Values]) -> Iterator[str]:
     """A sentence on every pose and direction whose stiffness is of another order than META's
     simulation says. columns: (n,) each, as of a data set."""
     for where, k, simulated in _slopes(meta, columns):
-        if k < 0 or not (k * _FAR < simulated < inf or k > _FAR * simulated):
+        if k < 0 or not (k * FAR < simulated < inf or k > FAR * simulated):
             continue
         units = slip(log(k / simulated), _U_LOG_FACTOR)
         hint = "" if units is None else f" Are these {units}?"
@@ -77,7 +74,7 @@ def _slope(meta: Stated, columns: Mapping[str, Values], rows: Flags) -> float | 
     sense = float((force - force[0]) @ (moved - moved[0]))
     force, moved = force - force.mean(), moved - moved.mean()
     square, product, own = float(force @ force), float(force @ moved), float(moved @ moved)
-    alike = product**2 > _ALIKE * square * own and product * sense > 0
+    alike = product**2 > LINE * square * own and product * sense > 0
     return square / product if alike else None
 
 

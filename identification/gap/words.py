@@ -57,6 +57,7 @@ BETWEEN_RUNS = DRIFTS | DATUM_JUMPS  # what one run does so, no other run forete
 SPRINGS = "joint_stiffness_error"  # the linear law of the joints' springs, which mechanisms share
 LATE = frozenset({"joint_creep", "time_lag"})  # what comes after the load
 
-# Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.
+# Troubles of running recordings that no word names (unmodelled_running.py): what they explain is
+# `unknown`.
 JERKS, DAMAGE, SOFTENING, WANDERS = "jerks", "damage", "softening", "wanders"
 UNMODELLED = (JERKS, DAMAGE, SOFTENING, WANDERS)

@@ -30,6 +30,6 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
     coefficients and their covariance; softer: what the springs turned out to be."""
-    stands = part.variant.to_actual_bench
-    there = bench if stands is None else stands(bench)
+    to_actual = part.variant.to_actual_bench
+    there = bench if to_actual is None else to_actual(bench)
     return EFFECTS[part.word].parameters(there, part.variant, Coefficients(w, cov, softer))

@@ -8,12 +8,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.answer.notes import FAULT, Note
 from identification.gap.model.bench import Bench
-from identification.slips import slip
+from identification.slips import FAR, LINE, slip
 
-# Of 1300 recordings, of rigs and of their simulations, none was off by more than twenty where the
-# response is a line for the most part.
-FAR = 50.0
-_ALIKE = 0.5  # of the response's square is what the simulation, scaled, explains
 _LEAST = 1e-9
 _SEVERAL = 2  # poses and directions
 _SPREAD, _BEYOND = 0.07, 3.0  # of what effects add to springs; times that is a fifth
@@ -27,7 +23,7 @@ def times_as_far(bench: Bench, predicted: Array) -> Array:
     for s in range(len(bench.data.setups)):
         mine = both[rows.setup == s]
         (square, product), (_, own) = mine.T @ (rows.weight[rows.setup == s, None] * mine)
-        if product**2 > _ALIKE * square * own:
+        if product**2 > LINE * square * own:
             out.append(float(product / square))
     return np.array(out)
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -85,27 +85,26 @@ def variants(bench: Bench) -> list[Variant]:
     never stood: how fast it went and how far are one thing there, and a curve is simpler."""
     if bench.load_history.never_held or bench.load_history.timeless:
         return []
-    spectrum = times(bench)
-    out, sizes = [], scales(bench)
+    times_s, sizes, other = times(bench), scales(bench), _other_rests(bench)
+    out: list[Variant] = []
     for j in bench.moving_joints():
         for memory, fresh in _memories(bench).items():
-            columns = _elements(bench, j, spectrum, fresh)
             info = {"joint": j, "memory": memory.strip(), "bent": False}
             name, likely = f"joint {j + 1}{memory}", _LIKELY[memory]
-            pairs = (0.3 if bench.data.arm else 0.5) * likely
-            other = _other_rests(bench)
+            columns = _elements(bench, j, times_s, fresh)
+            found = _Elements(name, columns, times_s, sizes, info)
             whole = 0.5 * likely / (1 + len(other))
-            out += _family(name, columns, spectrum, sizes, whole, pairs, info)
+            out.append(found.spectrum(whole))
+            out += found.pairs((0.3 if bench.data.arm else 0.5) * likely)
             for rested in other:
-                columns = _elements(bench, j, spectrum, fresh, rested=rested)
+                columns = _elements(bench, j, times_s, fresh, rested=rested)
                 called, told = f"{name} after rests of {rested:g} s", {**info, "rested": rested}
-                out.append(_spectrum(called, columns, spectrum, sizes, whole, told))
-        if (
-            bench.data.arm or not bench.load_history.one_rate
-        ):  # else it would be a loop of any shape
-            columns = _elements(bench, j, spectrum, None, is_bent=True)
+                out.append(_Elements(called, columns, times_s, sizes, told).spectrum(whole))
+        if bench.data.arm or not bench.load_history.one_rate:  # else a loop of any shape
             info = {"joint": j, "memory": "", "bent": True}
-            out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
+            columns = _elements(bench, j, times_s, None, is_bent=True)
+            found = _Elements(f"joint {j + 1}{BENT}", columns, times_s, sizes, info)
+            out += [found.spectrum(0.2), *found.pairs(0.2)]
     return out
 
 
@@ -138,65 +137,46 @@ def _elements(
     return [bench.add_joint(joint, y) for y in (unit * z).T]
 
 
-def _family(
-    name: str,
-    columns: list[int],
-    times_s: Array,
-    sizes: tuple[float, ...],
-    spectrum: float,
-    pairs: float,
-    info: dict[str, Any],
-) -> list[Variant]:
-    """The whole spectrum, and each time with its neighbour, of these priors."""
-    whole = _spectrum(name, columns, times_s, sizes, spectrum, info)
-    return [whole, *_pairs(name, columns, times_s, sizes, pairs, info)]
+class _Elements(NamedTuple):
+    """columns: indices of the pool, one for every time (k,) s; name, sizes (scales) and facts of
+    the shapes that are made of them."""
 
+    name: str
+    columns: list[int]
+    times_s: Array
+    sizes: tuple[float, ...]
+    info: dict[str, Any]
 
-def _spectrum(
-    name: str,
-    columns: list[int],
-    times_s: Array,
-    sizes: tuple[float, ...],
-    prior: float,
-    info: dict[str, Any],
-) -> Variant:
-    """All times, neighbours alike."""
-    return variant(
-        WORD,
-        f"{name} spectrum",
-        columns,
-        sizes,
-        root=smooth_root(len(columns), 0.5),
-        prior=prior,
-        each=True,
-        form="spectrum",
-        times_s=times_s,
-        **info,
-    )
-
-
-def _pairs(
-    name: str,
-    columns: list[int],
-    times_s: Array,
-    sizes: tuple[float, ...],
-    prior: float,
-    info: dict[str, Any],
-) -> list[Variant]:
-    """Each time with its neighbour."""
-    return [
-        variant(
+    def spectrum(self, prior: float) -> Variant:
+        """All times, neighbours alike."""
+        return variant(
             WORD,
-            f"{name} T {times_s[k]:.3g} s",
-            columns[k : k + 2],
-            sizes,
-            prior=prior / (len(columns) - 1),
+            f"{self.name} spectrum",
+            self.columns,
+            self.sizes,
+            root=smooth_root(len(self.columns), 0.5),
+            prior=prior,
             each=True,
-            times_s=times_s[k : k + 2],
-            **info,
+            form="spectrum",
+            times_s=self.times_s,
+            **self.info,
         )
-        for k in range(len(columns) - 1)
-    ]
+
+    def pairs(self, prior: float) -> list[Variant]:
+        """Each time with its neighbour; the prior is that of them all."""
+        return [
+            variant(
+                WORD,
+                f"{self.name} T {self.times_s[k]:.3g} s",
+                self.columns[k : k + 2],
+                self.sizes,
+                prior=prior / (len(self.columns) - 1),
+                each=True,
+                times_s=self.times_s[k : k + 2],
+                **self.info,
+            )
+            for k in range(len(self.columns) - 1)
+        ]
 
 
 def refined(bench: Bench, found: Variant, _: float = 1.0) -> list[Variant]:
@@ -217,7 +197,7 @@ def refined(bench: Bench, found: Variant, _: float = 1.0) -> list[Variant]:
         columns = _elements(
             bench, joint, times_s, fresh, is_bent=is_bent, stood=stood, rested=rested
         )
-        out += _pairs(name, columns, times_s, found.scales, prior, info)
+        out += _Elements(name, columns, times_s, found.scales, info).pairs(prior)
     return out
 
 

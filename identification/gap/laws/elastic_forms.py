@@ -50,7 +50,7 @@ def curve(
 
 def further(bench: Bench, slopes: Array) -> dict[str, Any]:
     """Limits on what a curve's slopes (m, k) have more than the simulated compliance. None of a
-    displacement that is imposed: a force may fall on the way (`judging.leftover`)."""
+    displacement that is imposed: a force may fall on the way (`judging.residual_checks`)."""
     return {} if bench.imposed else {"within": slopes, "floor": _STIFFEST}
 
 

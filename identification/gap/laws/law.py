@@ -70,9 +70,9 @@ class Laws:
 
         Raises ValueError for a variant that says too little of itself.
         """
-        stands = variant.to_actual_bench
+        to_actual = variant.to_actual_bench
         try:
-            law, scale = self.describe(bench if stands is None else stands(bench), variant)
+            law, scale = self.describe(bench if to_actual is None else to_actual(bench), variant)
         except KeyError as missing:
             raise ValueError(
                 f"{variant.word}, {variant.label}: the library does not say {missing} of this shape"
@@ -80,7 +80,7 @@ class Laws:
         if self.through_springs:
             springs = bench.compliance if variant.about is None else variant.about
             law = replace(law, constants={**law.constants, "about": tuple(springs.tolist())})
-        if stands is not None:
+        if to_actual is not None:
             law = replace(law, constants={**law.constants, AS_IT_STANDS: True})
         return law, scale
 

@@ -35,10 +35,12 @@ def refit_mechanism_variants(engine: Engine, explanation: Explanation) -> list[V
     if not changes_torques(law):
         return []
     values = scale * fit(engine, explanation).of(parts.index(other))[0]
-    stands = partial(bench_of_actual_arm, acts=[LawValues(law, values)])
-    with engine.on(stands(bench)):
+    to_actual = partial(bench_of_actual_arm, acts=[LawValues(law, values)])
+    with engine.on(to_actual(bench)):
         found = _shapes(engine, mine[0], other)
-    return [v.known_by(_WHERE, **{TO_ACTUAL_BENCH: stands, ANSWERS_TO: other.word}) for v in found]
+    return [
+        v.known_by(_WHERE, **{TO_ACTUAL_BENCH: to_actual, ANSWERS_TO: other.word}) for v in found
+    ]
 
 
 _ANSWERS = IN_JOINTS | {base_slip.WORD, base_compliance.WORD}

@@ -50,8 +50,8 @@ _FEWEST_ROWS = 30  # a table shorter than that any wave passes
 
 
 def with_unmodelled_evidence(found: SearchResult) -> SearchResult:
-    """With strangers beside the words: half of the prior of `unknown` is on no shape at all, half
-    on theirs; and what the gap looks like, where one of them is plain."""
+    """With unmodelled shapes beside the words: half of the prior of `unknown` is on no shape at
+    all, half on theirs; and what the gap looks like, where one of them is plain."""
     engine = found.engine
     variants = unmodelled_variants(engine.bench, engine.base, engine.target)
     if not variants:
@@ -101,11 +101,12 @@ def unmodelled_variants(bench: Bench, base: Base, target: Array) -> list[Variant
     ]
 
 
-def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[GapPattern, ...]:
-    """What the kinds of strangers say of a gap, the likeliest first. Periods that were not looked
-    at count as nothing, and so does what lies below the noise of a sample: that is no gap."""
+def likenesses(engine: Engine, variants: list[Variant]) -> tuple[GapPattern, ...]:
+    """What the kinds of unmodelled shapes say of a gap, the likeliest first. Periods that were not
+    looked at count as nothing, and so does what lies below the noise of a sample: that is no
+    gap."""
     out = []
-    for kind, mine in by_word(score(engine, engine.levels, strangers)).items():
+    for kind, mine in by_word(score(engine, engine.levels, variants)).items():
         top = max(mine, key=lambda s: s.log_evidence)
         part = Part(top.variant, top.scale)
         size = float(part_sizes(engine, (part,), top.level).gap[0])
