@@ -223,3 +223,10 @@ def test_a_gap_that_nothing_may_explain_though_it_is_met_is_said_to_be_met(
     text = diagnose_text.render(result)
     assert ("is met without any effect" in text) is met
     assert ("there is a gap" in text) is not met
+
+
+def test_joints_of_a_smaller_effect_are_said_to_be_its() -> None:
+    result = shown.explained().result
+    assert "joints      1\n" in diagnose_text._where(result)
+    drifts = replace(result, verdict="thermal_drift")
+    assert "joints      1 (joint_yield)\n" in diagnose_text._where(drifts)
