@@ -38,6 +38,30 @@ def closed_in(bench: Bench, x: Array, zone: float) -> Variant:
     return max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant
 
 
+def work_in_loops(bench: Bench, moved: Array) -> float:
+    """J that the load does on what moves the laser (n,) m, in all runs."""
+    same = np.diff(bench.rows.run) == 0
+    mean = (bench.load[1:] + bench.load[:-1]) / 2
+    return float(np.sum((mean * np.diff(moved))[same]))
+
+
+@pytest.mark.parametrize("rub", [0.25, -0.05, -0.25])
+def test_a_play_and_the_friction_beside_it_give_out_no_work(rub: float) -> None:
+    """Though of some too much friction is assumed: every load is taken off again."""
+    bench = make_bench(arm_data())
+    kept, given_out = [], []
+    for v in library(bench, ["joint_backlash"]):
+        w = np.zeros(len(v.columns))
+        w[:2] = 1e-4, rub * 1e-4
+        columns = np.column_stack([bench.columns[c][: bench.rows.n] for c in v.columns])
+        work = work_in_loops(bench, columns @ w)
+        kept.append(bool(np.all(v.within @ w >= 0)))
+        given_out.append(work < 0)
+    assert not any(k and out for k, out in zip(kept, given_out, strict=True))
+    assert any(kept)
+    assert all(kept) or any(given_out)
+
+
 def test_plays_cross_where_some_tool_balances_the_weights() -> None:
     bench = hanging(UP)
     found = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"]

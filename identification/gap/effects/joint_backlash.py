@@ -51,6 +51,7 @@ from identification.gap.laws.lost_motion import (
     net,
     resting_columns,
     within_play,
+    work_taken,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.variants import Variant, variant
@@ -298,10 +299,10 @@ def _zone(
     play = Play(bench, x, width)
     rubs: dict[bool, int] = {}
     for kind in kinds:
-        columns = [bench.add_joint(j, bench.sense * play.place(kind))]
-        kept = kind in KEPT
+        place, rub, kept = play.place(kind), play.rub(kind), kind in KEPT
+        columns = [bench.add_joint(j, bench.sense * place)]
         if kept not in rubs:
-            rubs[kept] = bench.add_joint(j, bench.sense * play.rub(kind))
+            rubs[kept] = bench.add_joint(j, bench.sense * rub)
         columns.append(rubs[kept])
         rests = kind in HELD or bool(info.get("closely"))
         columns += floating if kind not in HELD else []
@@ -318,7 +319,9 @@ def _zone(
                 prior=prior,
                 least=_least(bench, j, width),
                 each=(True,),
-                within=within_play(len(columns)),
+                within=within_play(
+                    len(columns), work_taken(bench, x, np.column_stack([place, rub]))
+                ),
                 **(info | {"kind": kind, "rests": rests}),
             )
         )

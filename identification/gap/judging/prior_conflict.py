@@ -95,7 +95,8 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     """(b,) Springs that are said to be off may be off, and so may that of a joint whose mechanism
     brings its own mean stiffness; a joint that plays, yielded or rubs may rest elsewhere without
     load, by as much as that moves it, and so may its reading be off; a force that drifts has done
-    so since it was tared; tares, and offsets of the joint readings, count as far as they move a
+    so since it was tared; a whole run may be off as far as META states of one sample, which
+    repetitions scatter by; tares, and offsets of the joint readings, count as far as they move a
     share of the gap that an explanation may not leave.
     """
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
@@ -109,7 +110,9 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     stated[springs] = base.sd[springs] * [
         _of_springs(float(fitted.base[i]), float(base.sd[i])) for i in springs
     ]
-    pulls = np.abs(stated) / np.hypot(base.sd, loose)
+    sd = base.sd.copy()
+    sd[base.index("scatter")] = engine.bench.noise.stated
+    pulls = np.abs(stated) / np.hypot(sd, loose)
     for j in _springs_that_may(engine, fitted):
         pulls[base.index(f"spring{j + 1}")] = 0.0
     left = _left_at_rest(engine, fitted)

@@ -135,15 +135,31 @@ def less_rub(k: int) -> Array:
     return out
 
 
-def within_play(k: int) -> Array:
+def within_play(k: int, work: Array) -> Array:
     """(m, k) of the coefficients: a play of that zone rubs as much too much at most as too little;
-    free places, from the third on, are no further off than half of the play, to either side."""
+    free places, from the third on, are no further off than half of the play, to either side; both
+    together use up work, of which each takes `work` (2,), and give out none."""
     free = np.eye(k)[2:]
     out = np.zeros((1 + 2 * len(free), k))
     out[:, 0], out[0, 1] = 1.0, 1.0 / MOST_RUB
     out[1::2] += 2.0 * free
     out[2::2] -= 2.0 * free
-    return out
+    if not np.any(work):
+        return out
+    return np.vstack([out, np.pad(work / np.linalg.norm(work), (0, k - 2))])
+
+
+def work_taken(bench: Bench, x: Array, places: Array) -> Array:
+    """(k,) Nm: work that net torques x (n,) do on places (n, k), in all runs together, beyond what
+    the torque at the start of each does. None is known where the load went further than rows
+    show."""
+    run, same = bench.rows.run, np.diff(bench.rows.run) == 0
+    if np.any(bench.rows.overshoot):
+        return np.zeros(places.shape[1])
+    start = np.flatnonzero(np.concatenate([[True], ~same]))
+    beyond = x - x[start][np.searchsorted(start, np.arange(len(run)), side="right") - 1]
+    mean = np.where(same, (beyond[1:] + beyond[:-1]) / 2, 0.0)
+    return np.asarray(mean @ np.diff(places, axis=0))
 
 
 def crosses(net: Array, torque: Array) -> bool:
