@@ -35,9 +35,8 @@ def diagnosed(law: Law, design=RICH) -> GapResult:  # type: ignore[no-untyped-de
     return explained(gap_data(imported(noisy(design, law), meta(design))))
 
 
-@pytest.mark.parametrize(
-    "fade", [0.7, *(pytest.param(f, marks=pytest.mark.slow) for f in (0.0, 0.3, 1.5))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("fade", [0.7, 0.0, 0.3, 1.5])
 def test_a_mounting_that_slips_anew_in_every_run_does_not_warm_up(fade: float) -> None:
     def law(rows: pd.DataFrame, _: Array) -> tuple[Array, Array]:
         turns = about_base(rows, np.array([0.0, 1, 0]), lambda m: 4e-6 * anew(m, 18.0, fade))

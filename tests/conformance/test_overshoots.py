@@ -110,6 +110,7 @@ def told(found: GapResult) -> bool:
     return any("gone too far, and back" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_friction_is_found_and_so_is_where_the_hand_went_too_far() -> None:
     found = diagnosed(FRICTION)
     assert found.verdict == "joint_hysteresis"

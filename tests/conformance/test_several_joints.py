@@ -94,6 +94,7 @@ def test_only_joint_readings_tell_several_joints_apart() -> None:
     assert in_more_joints(engine, variants, start) is start
 
 
+@pytest.mark.slow
 def test_a_joint_more_that_is_far_worse_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """No choice of shapes comes back from there."""
     found = result(0, 2)

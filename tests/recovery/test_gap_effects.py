@@ -192,9 +192,8 @@ def test_deleted_word_leaves_unknown(tmp_path: Path) -> None:
     assert found.verdict == "unknown"
 
 
-@pytest.mark.parametrize(
-    "word", [pytest.param("joint_hysteresis", marks=pytest.mark.slow), "load_misalignment"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["joint_hysteresis", "load_misalignment"])
 def test_an_effect_that_is_added_takes_no_other_s_place(tmp_path: Path, word: str) -> None:
     """Nor is more left with it: the search may like the word alone better than both, for fewer."""
     with_it = diagnose(measure(tmp_path, yields), add=[word]).result

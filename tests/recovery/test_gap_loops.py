@@ -41,6 +41,7 @@ def switches(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> An
     return out, np.zeros(len(samples))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "word"), [(bolts, "contact_seating"), (switches, "joint_hysteresis")]
 )

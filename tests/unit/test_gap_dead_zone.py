@@ -181,6 +181,7 @@ def bolted() -> Bench:
     return a_bench(force, u, "displacement")
 
 
+@pytest.mark.slow
 def test_friction_beside_it_does_not_hide_a_play(monkeypatch: pytest.MonkeyPatch) -> None:
     """What goes two ways has a middle; from one side nothing is said. A spectrum of friction that
     is stiff as well as soft takes the play itself: then the play explains more by far."""

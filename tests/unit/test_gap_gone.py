@@ -60,13 +60,16 @@ def said(result: GapResult) -> str:
     return Diagnosis("", result, known_effects=names).to_text()
 
 
+@pytest.mark.slow
 def test_what_is_as_the_model_has_it_is_no_gap() -> None:
     result = second_day(arm())
     assert (result.verdict, result.gone) == ("none", ())
     assert "has these effects already: joint_yield" in said(result)
 
 
-@pytest.mark.parametrize("added", slow_ones((0.0, 0.5 * ADDED, 1.6 * ADDED), (1.6 * ADDED,)))
+@pytest.mark.parametrize(
+    "added", slow_ones((0.0, 0.5 * ADDED, 1.6 * ADDED), (0.5 * ADDED, 1.6 * ADDED))
+)
 def test_what_was_repaired_or_got_worse_is_found_anew(added: float) -> None:
     """What the model has of it would pass for a law that is known to a tenth."""
     result = second_day(arm(added=added))
@@ -80,6 +83,7 @@ def test_what_was_repaired_or_got_worse_is_found_anew(added: float) -> None:
     assert "has these effects already" not in text
 
 
+@pytest.mark.slow
 def test_a_threshold_that_moved_is_the_joints_not_the_difference() -> None:
     result = second_day(arm(threshold_Nm=40.0))
     assert (result.verdict, result.gone) == ("joint_yield", ("joint_yield",))
@@ -87,12 +91,14 @@ def test_a_threshold_that_moved_is_the_joints_not_the_difference() -> None:
     assert threshold.low <= 40.0 <= threshold.high
 
 
+@pytest.mark.slow
 def test_a_drift_beside_it_leaves_it_where_it_is() -> None:
     result = second_day(arm(drift_N=8.0))
     assert (result.verdict, result.gone) == ("force_drift", ())
 
 
-@pytest.mark.parametrize("drift_N", slow_ones((0.0, 8.0), (0.0,)))
+@pytest.mark.slow
+@pytest.mark.parametrize("drift_N", [0.0, 8.0])
 def test_thresholds_are_met_by_the_true_force(drift_N: float) -> None:
     """Not by what an amplifier reads that has drifted."""
     data = arm(drift_N=drift_N)

@@ -13,7 +13,6 @@ from identification.gap.laws.memories import memories
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import RESET_PER_RUN, RESET_PER_SETUP
 from tests.explained import explained
-from tests.slow import slow_ones
 from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_forms import arm_data
 
@@ -41,9 +40,8 @@ def gives_way(memory: str) -> GapData:
     return as_read(there, force, turned, rng)
 
 
-@pytest.mark.parametrize(
-    "memory", slow_ones(("", RESET_PER_SETUP, RESET_PER_RUN), ("", RESET_PER_SETUP))
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("memory", ["", RESET_PER_SETUP, RESET_PER_RUN])
 def test_it_is_a_yield_and_its_threshold_is_found(memory: str) -> None:
     """The torque goes to 123 Nm, and flows back by no law of kinematic hardening."""
     found = explained(gives_way(memory))

@@ -12,7 +12,6 @@ from identification.gap.data import GapData
 from identification.gap.effects import contact_seating, library
 from identification.gap.model.bench import Bench, make_bench
 from tests.explained import explained
-from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_running import running, triangle
 
@@ -40,7 +39,8 @@ def steps(data: GapData) -> tuple[Array, Array]:
     return change[hold], first
 
 
-@pytest.mark.parametrize("late", slow_ones((False, True), (True,)))
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [False, True])
 def test_what_is_ahead_of_the_load_does_not_lag(late: bool) -> None:
     """The first reading of every hold: a tenth of the step too far, as a hand leaves it, or too
     little."""
@@ -50,6 +50,7 @@ def test_what_is_ahead_of_the_load_does_not_lag(late: bool) -> None:
     assert (explained(moved(data, off)).verdict == "time_lag") is late
 
 
+@pytest.mark.slow
 def test_what_is_stiff_then_soft_then_stiff_again_is_no_seat() -> None:
     """It snaps, in every pose and direction."""
     data = arm_data()

@@ -13,6 +13,7 @@ from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import LAWS, RUBS, STEPS
 from identification.gap.model.bench import make_bench
 from tests.explained import explained
+from tests.slow import slow_ones
 from tests.unit.arm_as_read import as_read, levels_of
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
@@ -39,7 +40,7 @@ def test_seats_that_rub_are_pressed_by_what_friction_lets_through() -> None:
             assert taken[slack] == pytest.approx(wanted, abs=5e-3)
 
 
-@pytest.mark.parametrize(("opens", "seats"), [(False, True), (True, False)])
+@pytest.mark.parametrize(("opens", "seats"), slow_ones(((False, True), (True, False)), (True,)))
 def test_what_gives_way_under_more_force_is_no_seat(opens: bool, seats: bool) -> None:
     """A flange that opens at half of the load, in every direction and pose."""
     data = arm_data()

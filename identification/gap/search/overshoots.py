@@ -23,15 +23,15 @@ from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult, explain
+from identification.gap.explanations.fit import fit
 from identification.gap.model.history import sampling_time
 from identification.gap.recording.rows import Rows
-from identification.gap.search.overshoot_paths import Overshoots, Paths
+from identification.gap.search.overshoot_paths import SELDOM, Overshoots, Paths
 
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
 _MOST = 3_000_000  # holds times rows: of more it would last longer than all the rest
 _FLOWING = 10  # times as long takes a path along which something flows
 _LOOKED_AT, _SEVERAL = 12, 3  # explanations; that remember, where none foretells the others
-_SELDOM = 0.5  # of the holds at most: whose law needs more is no law with a hand beside it
 _PARTS = 3  # of an explanation at most, where none foretells the others: more say nothing of loads
 _LOADED = 0.02  # of the largest load: less is none, and nobody pulls at a contact
 _PLAIN = 10.0  # nats that are gained at least, for all to be searched once more
@@ -89,15 +89,33 @@ _BEHIND = 1000.0  # nats that a word alone may gain by loads that no row shows
 
 
 def _lags(found: SearchResult) -> Iterator[Explanation]:
-    """Lags of the laser, between delay and filter, as long as they would hardly be noticed."""
-    engine = found.engine
+    """Lags of the laser, between delay and filter, as long as they would hardly be noticed; none
+    where one alone leaves more than the best explanation does of readings that it is over for:
+    there no path helps it."""
+    engine, first = found.engine, found.explanations[0]
     if not engine.bench.data.arm:
         return
     longest = _NOTICED * sampling_time(engine.bench.rows)
     shapes = [v for v in found.variants if v.lags_freely and v.lag_s <= longest]
     for s in score(engine, engine.levels, shapes):
-        yield explain(engine, (Part(s.variant, s.scale),), s.log_evidence)
+        lag = explain(engine, (Part(s.variant, s.scale),), s.log_evidence)
+        if _left_when_over(engine, lag) <= max(_SETTLED * engine.bench.noise.stated, first.eta):
+            yield lag
 
+
+def _left_when_over(engine: Engine, lag: Explanation) -> float:
+    """rms (m) of the response that a lag leaves in rows so long after the first of their hold that
+    what came before is gone."""
+    rows = engine.bench.rows
+    late = rows.time - rows.time[rows.edges][rows.hold] > _OVER * lag.parts[0].variant.lag_s
+    if not late.any():
+        return 0.0
+    left = engine.target[: rows.n] - fit(engine, lag).response
+    return float(np.sqrt(np.average(left[late] ** 2, weights=rows.weight[late])))
+
+
+_OVER = 4.0  # times its time constant
+_SETTLED = 1.5  # times the noise
 
 _NOTICED = 2.5  # samples
 
@@ -131,7 +149,7 @@ def _unlike(each: Iterable[tuple[Explanation, Paths]]) -> Iterator[tuple[Explana
 def _worth(more: Overshoots, gain: float, pays: float) -> bool:
     """Whether a path may be one: not with loads before most of the holds, which is a law that is
     wrong, nor where they gain (nats) too small a share of what they cost."""
-    return more.count <= _SELDOM * more.of and gain > pays * more.cost
+    return more.count <= SELDOM * more.of and gain > pays * more.cost
 
 
 def _of_the_one_ahead(paths: Iterator[tuple[float, Overshoots]], known: Array) -> Overshoots | None:

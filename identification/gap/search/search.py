@@ -314,10 +314,14 @@ def _anew(
     """With instruments that read what its other effects do, a pose, and what goes through the
     springs, that are looked at beside them, and mechanisms that answer to these, if that is better;
     the variants then hold these as well. Not so where hardly more than noise is left to gain, and
-    others of the pool are far ahead."""
+    others of the pool are far ahead; nor where far more is left than any of these corrections, a
+    few percent of what the effects do."""
+    noise = engine.bench.noise.stated
+    if start.eta > max(_GROSS * noise, _MOST_LEFT * engine.structural):
+        return start
     found = _with(engine, variants, start, _read_and_placed(engine, start))
     behind = found.log_weight < _best(pool) - _MAY_GAIN
-    if behind and found.eta <= engine.bench.noise.stated:
+    if behind and found.eta <= noise:
         return found
     for _ in range(_TURNS):  # where the arm stands was found beside a law of the simulated torques
         plain = in_one_joint_each(found)
@@ -332,6 +336,7 @@ def _anew(
 
 
 _TURNS, _TURN_GAINS = 4, 3.0  # at most; nats
+_GROSS, _MOST_LEFT = 6.0, 0.3  # times the noise; of what springs leave
 
 
 def _with(
