@@ -57,7 +57,7 @@ def station_text() -> str:
     text = (HOME / "protocols/stations/emulated.yaml").read_text(encoding="utf-8")
     return (
         text.replace("name: emulated", "name: bench")
-        .replace("speed: 50", "speed: 1")
+        .replace("speed: 25", "speed: 1")
         .replace("output_rate_Hz: 2500", "output_rate_Hz: 10000")
     )
 

@@ -14,7 +14,7 @@ from typing import Any
 from drivers.errors import DeviceError, SafetyStop
 
 _ENOUGH = 20  # slots before anything is said
-_USUAL_SPEED = 50  # of the project's emulated station
+_USUAL_SPEED = 25  # of the project's emulated station
 _MOST_MISSED = 1 / 3  # of them; up to there steps settle and the hand finds its levels
 
 
