@@ -168,7 +168,7 @@ def test_a_second_spring_stiffens_reversibly() -> None:
 def test_the_same_seed_draws_the_same_case_and_its_data_set_is_marked(tmp_path: Path) -> None:
     draw, words = generator("mujoco")
     assert words == EFFECTS
-    first, again = (draw(9, 4, word="joint_yield") for _ in range(2))
+    first, again = (draw(9, 5, word="joint_yield") for _ in range(2))
     assert first.label["truth"] == first.label["accept"] == ["joint_yield"]
     assert first.label["where"]["seen_by_encoders"]
     assert len(first.label["where"]["joints"]) == 1
