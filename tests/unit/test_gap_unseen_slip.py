@@ -49,7 +49,8 @@ def rubbing(step_N: float) -> GapData:
     return replace(data, step=step, compliance=np.array([1 / SPRING]), instruments=meter)
 
 
-@pytest.mark.parametrize(("step_N", "widest"), slow_ones(((20.0, 0.6), (4.0, 0.3)), (4.0, 20.0)))
+@pytest.mark.slow
+@pytest.mark.parametrize(("step_N", "widest"), [(20.0, 0.6), (4.0, 0.3)])
 def test_how_far_friction_gives_way_is_known_as_far_as_readings_show_it(
     step_N: float, widest: float
 ) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.model.bench import Bench
+from identification.running import first_rows, stretches
 
 KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
 SOFTER = 2.5  # of soft ends one than the other
@@ -153,11 +154,11 @@ def work_taken(bench: Bench, x: Array, places: Array) -> Array:
     """(k,) Nm: work that net torques x (n,) do on places (n, k), in all runs together, beyond what
     the torque at the start of each does. None is known where the load went further than rows
     show."""
-    run, same = bench.rows.run, np.diff(bench.rows.run) == 0
+    run = bench.rows.run
     if np.any(bench.rows.overshoot):
         return np.zeros(places.shape[1])
-    start = np.flatnonzero(np.concatenate([[True], ~same]))
-    beyond = x - x[start][np.searchsorted(start, np.arange(len(run)), side="right") - 1]
+    beyond = x - x[first_rows(run)][stretches(run)]
+    same = run[1:] == run[:-1]
     mean = np.where(same, (beyond[1:] + beyond[:-1]) / 2, 0.0)
     return np.asarray(mean @ np.diff(places, axis=0))
 
